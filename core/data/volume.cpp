@@ -55,6 +55,16 @@ std::uint64_t VolumeDesc::dense_bytes() const {
     return checked_product(dims, voxel_bytes(), name.empty() ? "volume" : name);
 }
 
+SamplingBox sampling_box(const VolumeDesc& desc) {
+    SamplingBox box{glm::dvec3(0.0), glm::dvec3(desc.dims) - 1.0};
+    for (int a = 0; a < 3; ++a)
+        if (desc.dims[a] == 1) {
+            box.lo[a] = -0.5;
+            box.hi[a] = 0.5;
+        }
+    return box;
+}
+
 std::string summary(const VolumeDesc& desc) {
     glm::dvec3 s = desc.spacing();
     std::string text = fmt::format("{} x {} x {} {}", desc.dims.x, desc.dims.y, desc.dims.z,

@@ -45,6 +45,13 @@ struct VolumeDesc {
 // "256 x 256 x 128 u8, spacing 1 x 1 x 1 mm": one line for messages and listings.
 std::string summary(const VolumeDesc& desc);
 
+// Where a volume is sampled, in index coordinates: from the first to the last voxel on each axis; an
+// axis with one voxel is a slab one spacing thick around it, along which the value is constant.
+struct SamplingBox {
+    glm::dvec3 lo, hi;
+};
+SamplingBox sampling_box(const VolumeDesc& desc);
+
 // What an analytic volume says of itself, so that tests and references need no interpolation.
 struct ClosedForm {
     std::function<double(glm::dvec3 world)> value;         // before rounding to the scalar type
