@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
-#include <list>
 #include <stop_token>
 #include <string>
 #include <unordered_map>
@@ -23,7 +23,9 @@ class ResultCache {
     explicit ResultCache(std::uint64_t byte_limit = std::uint64_t(4) << 30) : limit_(byte_limit) {}
     struct Result {
         std::vector<Value> outputs;
-        std::map<std::string, std::pair<double, std::string>> measurements;  // shown again on a hit
+        // Shown again on a hit.
+        std::map<std::string, std::pair<double, std::string>> measurements;
+        std::vector<std::string> warnings;
         std::uint64_t bytes = 0;
     };
     using ResultPtr = std::shared_ptr<const Result>;
@@ -77,9 +79,10 @@ struct RunResult {
 struct RunObserver {
     virtual ~RunObserver() = default;
     virtual void state_changed(int /*node*/, const NodeReport& /*report*/) {}
-    // fraction of the node; eta_seconds of the whole run, negative while unknown.
+    // Fraction of the node, and the time that the slowest of the running nodes still needs at its
+    // pace so far; negative while unknown.
     virtual void progress(int /*node*/, double /*fraction*/, std::string_view /*what*/,
-                          double /*run_fraction*/, double /*eta_seconds*/) {}
+                          double /*seconds_left*/) {}
     virtual void provisional(int /*node*/, int /*output*/, const Value& /*value*/) {}
     virtual bool wants_provisional() const { return false; }
 };
@@ -95,9 +98,6 @@ struct RunOptions {
 // Runs what is asked for, branches in parallel. Blocks the calling thread, which must not be the
 // OpenGL thread. Nodes that fail are reported, the other branches go on.
 RunResult evaluate(const Plan& plan, ResultCache& cache, const RunOptions& options = {});
-
-// The report as JSON text (docs/report.md).
-std::string to_json(const Plan& plan, const RunResult& result);
 
 // Runs the newest request, for people who edit while they look: a newer one cancels the running
 // one, the last always wins, submit() never waits.
