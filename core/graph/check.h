@@ -26,7 +26,9 @@ struct Plan {
         Mark mark;
         bool ok = false;                          // it and all of its ancestors have no problem
     };
-    std::vector<Node> nodes;      // in topological order: every source stands before its consumers
+    // In topological order: every source stands before its consumers, but for nodes on a cycle,
+    // which are not ok.
+    std::vector<Node> nodes;
     std::vector<Source> wanted;   // what the graph asks for; output -1: the node itself (a writer)
     std::vector<Problem> problems;  // in order of line
     std::vector<std::string> warnings;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,8 @@ struct Problem {
     // "graph.yaml:14:7: node 'enc': message"
     std::string text(const std::filesystem::path& file) const;
 };
+
+struct YamlNode;  // core/graph/yaml_tree.h
 
 // --- what the text says, before anything is known of node types -------------------------------
 
@@ -125,8 +128,12 @@ class Document {
     };
     using Change = std::vector<Splice>;
 
+    struct Parsed {};
+    explicit Document(Parsed) {}
+
     std::string text_;
     Graph graph_;
+    std::shared_ptr<const YamlNode> tree_;  // of text_; immutable, so copies of a document share it
     std::vector<Change> history_;
     std::size_t done_ = 0;
     int step_depth_ = 0;
