@@ -1,7 +1,9 @@
 // The one cache of decoded bricks, above every codec.
 //
 // Byte limit, least recently used out first, pins, and each family decoded once however many
-// threads ask. Ancestors are fetched as needed. Bricks that are pinned or in someone's hands stay.
+// threads ask. Ancestors are fetched as needed. Bricks that are in someone's hands (a BrickVoxelsPtr
+// or a Pin) stay. The limit holds for everything at once: what is kept, what is in someone's hands
+// and what is being decoded. All members may be called from any thread.
 #pragma once
 
 #include <cstdint>
@@ -16,11 +18,11 @@ namespace voxloom {
 class BrickCache {
   public:
     struct Counters {
-        std::uint64_t hits = 0, misses = 0;      // bricks asked for
+        std::uint64_t hits = 0, misses = 0;      // bricks asked for: there at once, or not
         std::uint64_t families_decoded = 0;
         std::uint64_t bricks_evicted = 0;
-        std::uint64_t waits = 0;                 // asked for while another thread was decoding it
-        std::uint64_t bytes = 0, peak_bytes = 0; // decoded voxels held
+        std::uint64_t waits = 0;                 // misses that another thread was just decoding
+        std::uint64_t bytes = 0, peak_bytes = 0; // held, and set aside for what is being decoded
     };
 
     explicit BrickCache(std::uint64_t byte_limit);
@@ -31,12 +33,14 @@ class BrickCache {
     // The process's cache; its limit is set by the runtime.
     static BrickCache& global();
 
+    // A lower limit takes effect at once, but for what is in someone's hands.
     void set_byte_limit(std::uint64_t bytes);
     std::uint64_t byte_limit() const;
     Counters counters() const;
 
     // The decoded brick; decodes its family, and first its ancestors, where they are not there.
-    // Throws Error when the limit cannot hold the family together with what is pinned.
+    // Waits while another thread decodes the same family or occupies the memory for now. Throws
+    // Error when the limit cannot hold the family, its parent, and what is in someone's hands.
     BrickVoxelsPtr get(const BricksPtr& bricks, BrickId id, const std::stop_token& stop = {});
     // The brick when it is there at once; null otherwise. Never decodes.
     BrickVoxelsPtr peek(const Bricks& bricks, BrickId id);
@@ -51,30 +55,33 @@ class BrickCache {
     class Pin {
       public:
         Pin() = default;
-        Pin(Pin&&) noexcept;
-        Pin& operator=(Pin&&) noexcept;
-        ~Pin();
         const BrickVoxelsPtr& voxels() const { return voxels_; }
 
       private:
         friend class BrickCache;
-        BrickCache* cache_ = nullptr;
-        std::uint64_t identity_ = 0;
-        BrickId id_;
+        explicit Pin(BrickVoxelsPtr voxels) : voxels_(std::move(voxels)) {}
         BrickVoxelsPtr voxels_;
     };
-    Pin pin(const BricksPtr& bricks, BrickId id, const std::stop_token& stop = {});
+    Pin pin(const BricksPtr& bricks, BrickId id, const std::stop_token& stop = {}) {
+        return Pin(get(bricks, id, stop));
+    }
 
-    // Forgets every brick of one Bricks (called when it dies).
+    // Forgets every brick of one Bricks; what is in someone's hands counts until it is given back.
     void drop(std::uint64_t identity);
+    // The same in every cache there is: called when a Bricks dies.
+    static void drop_everywhere(std::uint64_t identity);
+
+    struct State;
 
   private:
-    struct State;
-    std::unique_ptr<State> state_;
+    friend void read_region(const BricksPtr&, int, const Box&, std::span<std::byte>, BrickCache&,
+                            const std::stop_token&);
+    std::shared_ptr<State> state_;  // outlives the cache in the hands of those who hold bricks
 };
 
-// Voxels of `box` of a level, converted to desc().volume.type: rounded and clamped to its limits.
-// The box may reach outside of the level: the border is replicated.
+// Voxels of `box` of a level, converted to desc().volume.type: rounded half to even and clamped to
+// its limits. The box may reach outside of the level: the border is replicated; a level without
+// voxels gives zeros. Large boxes decode in parallel.
 void read_region(const BricksPtr& bricks, int level, const Box& box, std::span<std::byte> out,
                  BrickCache& cache, const std::stop_token& stop = {});
 
@@ -87,7 +94,11 @@ struct Apron {
 void read_brick(const BricksPtr& bricks, BrickId id, Apron apron, std::span<std::byte> out,
                 BrickCache& cache, const std::stop_token& stop = {});
 
-// A level as a Volume that reads through the cache; world coordinates agree with level 0.
+// What level_as_volume() will say of itself: dims and index_to_world of the level; no value range
+// for coarse levels.
+VolumeDesc level_volume_desc(const BricksDesc& bricks, int level);
+// A level as a Volume that reads through the cache (which must outlive it); world coordinates agree
+// with level 0.
 VolumePtr level_as_volume(BricksPtr bricks, int level, BrickCache& cache);
 
 }  // namespace voxloom

@@ -1,0 +1,84 @@
+#include "core/data/convert.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+
+#include "core/base/buffer.h"
+
+namespace voxloom {
+
+namespace {
+
+// Adding and taking away 1.5 * 2^52 leaves the nearest integer, ties to even, for |v| < 2^51; unlike
+// nearbyint() it vectorises on every machine.
+constexpr double kRound = 0x1.8p52;
+
+template <class T>
+T narrowed(double v) {
+    constexpr double lo = double(std::numeric_limits<T>::lowest());
+    constexpr double hi = double(std::numeric_limits<T>::max());
+    if constexpr (std::is_floating_point_v<T>) {
+        return std::isinf(v) ? T(v) : T(v < lo ? lo : v > hi ? hi : v);
+    } else {
+        v = v == v ? v : 0.0;
+        v = v < lo ? lo : v > hi ? hi : v;
+        return T((v + kRound) - kRound);
+    }
+}
+
+}  // namespace
+
+void to_double(ScalarType type, const std::byte* from, std::size_t count, double* to) {
+    with_type(type, [&](auto t) {
+        const auto* values = reinterpret_cast<const decltype(t)*>(from);
+        for (std::size_t i = 0; i < count; ++i) to[i] = double(values[i]);
+    });
+}
+
+void from_double(const double* from, std::size_t count, ScalarType type, std::byte* to) {
+    with_type(type, [&](auto t) {
+        using T = decltype(t);
+        T* values = reinterpret_cast<T*>(to);
+        for (std::size_t i = 0; i < count; ++i) values[i] = narrowed<T>(from[i]);
+    });
+}
+
+void convert(ScalarType from_type, const std::byte* from, ScalarType to_type, std::byte* to,
+             std::size_t count) {
+    if (from_type == to_type) {
+        std::memcpy(to, from, count * bytes_of(from_type));
+        return;
+    }
+    constexpr std::size_t kChunk = 512;
+    double values[kChunk];
+    for (std::size_t i = 0; i < count; i += kChunk) {
+        const std::size_t n = std::min(kChunk, count - i);
+        to_double(from_type, from + i * bytes_of(from_type), n, values);
+        from_double(values, n, to_type, to + i * bytes_of(to_type));
+    }
+}
+
+void convert_box(const Box& box, ScalarType from_type, const std::byte* from, const Box& from_box,
+                 ScalarType to_type, std::byte* to, const Box& to_box, int components) {
+    const std::size_t from_bytes = bytes_of(from_type) * std::size_t(components);
+    const std::size_t to_bytes = bytes_of(to_type) * std::size_t(components);
+    if (from_type == to_type) {
+        copy_box(box, from, from_box, to, to_box, from_bytes);
+        return;
+    }
+    if (box.empty()) return;
+    assert(from_box.contains(box) && to_box.contains(box));
+    const Index3 fd = from_box.dims(), td = to_box.dims();
+    const std::size_t row = std::size_t(box.dims().x) * std::size_t(components);
+    for (std::int64_t z = box.lo.z; z < box.hi.z; ++z)
+        for (std::int64_t y = box.lo.y; y < box.hi.y; ++y) {
+            const Index3 f = Index3(box.lo.x, y, z) - from_box.lo;
+            const Index3 t = Index3(box.lo.x, y, z) - to_box.lo;
+            convert(from_type, from + std::size_t((f.z * fd.y + f.y) * fd.x + f.x) * from_bytes,
+                    to_type, to + std::size_t((t.z * td.y + t.y) * td.x + t.x) * to_bytes, row);
+        }
+}
+
+}  // namespace voxloom
