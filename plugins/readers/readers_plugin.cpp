@@ -1,11 +1,12 @@
 // The readers: files and analytic phantoms to Volume and Series.
 #include "core/plugin/plugin.h"
+#include "plugins/readers/phantom.h"
 
 namespace voxloom {
 
 namespace {
 
-void add_nodes(Registry& /*registry*/) {}
+void add_nodes(Registry& registry) { add_phantoms(registry); }
 
 }  // namespace
 

@@ -9,11 +9,6 @@
 #include "core/gpu/thread.h"
 #include "core/plugin/loader.h"
 
-// Weak: tests of nodes that do not draw link before there is an OpenGL thread.
-namespace voxloom::gpu {
-[[gnu::weak]] void run(const std::function<void()>& f);
-}
-
 namespace voxloom::testing {
 
 const Registry& built_plugins() {
