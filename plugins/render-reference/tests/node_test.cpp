@@ -1,0 +1,76 @@
+// The node reference.raycast: ports, parameters, messages.
+#include <gtest/gtest.h>
+
+#include "core/base/error.h"
+#include "core/plugin/plugin.h"
+#include "plugins/render-reference/tests/scenes.h"
+#include "tests/support/run_node.h"
+
+extern "C" const voxloom::PluginTable* voxloom_plugin();
+
+namespace voxloom::reference {
+namespace {
+
+using namespace testing;
+using voxloom::testing::NodeInputs;
+using voxloom::testing::run_node;
+
+const Registry& registry() {
+    static const Registry with_node = [] {
+        Registry r;
+        voxloom_plugin()->add_to(r);
+        return r;
+    }();
+    return with_node;
+}
+
+NodeInputs inputs(Value source) {
+    return {{"source", {std::move(source)}},
+            {"transfer", {bumps()}},
+            {"camera", {look({30, 17, 22}, {5, 5, 5})}}};
+}
+
+TEST(ReferenceNode, DrawsAPictureOfTheSizeAskedFor) {
+    const auto run = run_node(registry(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
+    EXPECT_EQ(run.image()->size(), glm::ivec2(20, 10));
+    float brightest = 0;
+    for (const glm::vec4& pixel : run.image()->rgba32f()) {
+        EXPECT_EQ(pixel.a, 1.0f);  // the opaque background is under it
+        brightest = std::max(brightest, pixel.b);
+    }
+    EXPECT_GT(brightest, 0.1f);
+    EXPECT_FALSE(run.progress.empty());
+    EXPECT_EQ(run.progress.back(), 1.0);
+}
+
+TEST(ReferenceNode, LightsReplaceTheHeadlight) {
+    auto dark = std::make_shared<Lights>();
+    dark->lights.clear();
+    dark->ambient = 1;
+    NodeInputs lit = inputs(waves_volume());
+    lit["lights"] = {LightsPtr(dark)};
+    // Without lights and with full ambient light a shaded picture is the unshaded one.
+    const auto shaded = run_node(registry(), "reference.raycast", "{size: [16, 16], shading: true}", lit).image();
+    const auto plain = run_node(registry(), "reference.raycast", "{size: [16, 16]}", lit).image();
+    for (int y = 0; y < 16; ++y)
+        for (int x = 0; x < 16; ++x)
+            EXPECT_LT(glm::length(shaded->at(x, y) - plain->at(x, y)), 1e-6f);
+}
+
+TEST(ReferenceNode, WrongCombinationsAreNamedBeforeAnythingIsDrawn) {
+    auto message = [](const std::string& params) -> std::string {
+        try {
+            run_node(registry(), "reference.raycast", params, inputs(waves_volume()));
+        } catch (const Error& e) {
+            return e.what();
+        }
+        return "";
+    };
+    EXPECT_NE(message("{mode: cells, reconstruction: tricubic}").find("steps or auto"), std::string::npos);
+    EXPECT_NE(message("{component: 1}").find("component 1 is not there"), std::string::npos);
+    EXPECT_NE(message("{gradient_modulation: [2, 1]}").find("must not exceed"), std::string::npos);
+    EXPECT_NE(message("{field: closed-form}").find("no closed form"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace voxloom::reference
