@@ -1,7 +1,7 @@
 // The head: some eighty ellipsoids, painted one over the other like the parts of a wax model.
 //
-// Part k covers a point by c = smooth step of the distance to its surface, `edge` wide, and mixes
-// its Hounsfield units in: v <- (1 - c) v + c h. The order of the list is the order of painting, so
+// Part k covers a point by c = smooth step of the distance to its surface, `edge` wide (thin parts
+// have thinner edges), and mixes its Hounsfield units in: v <- (1 - c) v + c h. The order of the list is the order of painting, so
 // a shell is a large part and a smaller one over it. The field is C1, and its gradient follows the
 // same recurrence.
 //
@@ -76,7 +76,7 @@ std::vector<Part> head() {
     add(kGrey, {0, 0.04, 0.21}, {0.605, 0.785, 0.650});
     pair(kWhite, {0.28, 0.04, 0.24}, {0.24, 0.65, 0.47});
     pair(kGrey, {0.25, -0.02, 0.14}, {0.09, 0.16, 0.10});
-    add(kWater, {0, 0.02, 0.62}, {0.014, 0.66, 0.30});
+    add(kWater, {0, 0.04, 0.54}, {0.014, 0.49, 0.23});
     pair(kWater, {0.50, -0.12, 0.10}, {0.09, 0.22, 0.012}, 0.2);
     // Ventricles, pineal gland, plexus, a fresh bleeding.
     pair(kWater, {0.12, -0.08, 0.27}, {0.060, 0.32, 0.085}, -0.15);
@@ -86,8 +86,8 @@ std::vector<Part> head() {
     pair(kSponge, {0.20, 0.34, 0.17}, {0.020, 0.030, 0.020});
     add(kBlood, {0.36, -0.18, 0.36}, {0.10, 0.13, 0.09}, 0.3);
     // Cerebellum, brain stem, fourth ventricle, spinal cord in its canal.
-    add(kWater, {0, 0.42, -0.24}, {0.40, 0.32, 0.18});
-    pair(kGrey, {0.20, 0.44, -0.25}, {0.185, 0.27, 0.155});
+    add(kWater, {0, 0.34, -0.23}, {0.38, 0.26, 0.17});
+    pair(kGrey, {0.19, 0.36, -0.24}, {0.175, 0.22, 0.145});
     add(kGrey, {0, 0.15, -0.20}, {0.11, 0.12, 0.30}, -0.1);
     add(kWater, {0, 0.27, -0.22}, {0.035, 0.03, 0.07});
     // Spine.
@@ -127,13 +127,15 @@ std::vector<Part> head() {
     return parts;
 }
 
-// A part ready for evaluation: q(p) = |A (p - centre)| is 1 on the surface, and (q - 1) * size is
-// the distance from it (exactly so along the smallest radius, a lower bound elsewhere).
+// A part ready for evaluation: q(p) = |A (p - centre)| is 1 on the surface, and (q - 1) times the
+// smallest radius is the distance from it (exactly so along that radius, a lower bound elsewhere).
 struct Shape {
     double hounsfield;
     dvec3 centre, inverse_radii, bounds;  // bounds: half extents of the outer edge's box
-    double cosine, sine, size;
+    double cosine, sine;
+    double steepness;                     // smallest radius / width of the edge
 };
+constexpr double kSmallestSteepness = 1.7;  // the edge takes at most 0.3 of a radius on either side
 
 inline dvec3 scaled(const Shape& s, dvec3 d) {
     return {d.x * s.inverse_radii.x, (s.cosine * d.y + s.sine * d.z) * s.inverse_radii.y,
@@ -141,8 +143,8 @@ inline dvec3 scaled(const Shape& s, dvec3 d) {
 }
 
 // 1 inside, 0 outside, a cubic step between; `t` runs from 1 to 0 over the edge.
-inline double coverage(double q, double size, double inverse_edge) {
-    double t = 0.5 - (q - 1) * size * inverse_edge;
+inline double coverage(double q, double steepness) {
+    double t = 0.5 - (q - 1) * steepness;
     t = t < 0 ? 0 : t;
     t = t > 1 ? 1 : t;
     return t * t * (3 - 2 * t);
@@ -150,20 +152,21 @@ inline double coverage(double q, double size, double inverse_edge) {
 
 // Of a row: q^2 = (dx a)^2 + rest, since the tilt leaves x alone.
 VOXLOOM_WIDE void paint_edge(const double* x, std::size_t n, double cx, double ax, double rest,
-                             double size, double inverse_edge, double hounsfield, double* out) {
+                             double steepness, double hounsfield, double* out) {
     for (std::size_t i = 0; i < n; ++i) {
         const double dx = (x[i] - cx) * ax;
-        const double c = coverage(std::sqrt(dx * dx + rest), size, inverse_edge);
+        const double c = coverage(std::sqrt(dx * dx + rest), steepness);
         out[i] = (1 - c) * out[i] + c * hounsfield;
     }
 }
 
 class CtHead final : public Field {
   public:
-    explicit CtHead(double edge) : edge_(edge) {
+    explicit CtHead(double edge) {
         for (const Part& part : head()) {
+            const double smallest = std::min({part.radii.x, part.radii.y, part.radii.z});
             Shape s{part.hounsfield, part.centre, 1.0 / part.radii, {}, std::cos(part.tilt),
-                    std::sin(part.tilt), std::min({part.radii.x, part.radii.y, part.radii.z})};
+                    std::sin(part.tilt), std::max(smallest / edge, kSmallestSteepness)};
             const dvec3 outer = part.radii * outer_q(s);
             s.bounds = {outer.x, std::hypot(s.cosine * outer.y, s.sine * outer.z),
                         std::hypot(s.sine * outer.y, s.cosine * outer.z)};
@@ -174,7 +177,7 @@ class CtHead final : public Field {
         double v = kAir;
         for (const Shape& s : shapes_) {
             const dvec3 u = scaled(s, p - s.centre);
-            const double c = coverage(std::sqrt(u.x * u.x + (u.y * u.y + u.z * u.z)), s.size, 1 / edge_);
+            const double c = coverage(std::sqrt(u.x * u.x + (u.y * u.y + u.z * u.z)), s.steepness);
             v = (1 - c) * v + c * s.hounsfield;
         }
         return v;
@@ -185,15 +188,15 @@ class CtHead final : public Field {
         for (const Shape& s : shapes_) {
             const dvec3 u = scaled(s, p - s.centre);
             const double q = glm::length(u);
-            const double t = std::clamp(0.5 - (q - 1) * s.size / edge_, 0.0, 1.0);
+            const double t = std::clamp(0.5 - (q - 1) * s.steepness, 0.0, 1.0);
             const double c = t * t * (3 - 2 * t);
             if (c <= 0) continue;
-            // dc/dp = 6 t (1 - t) * (-size / edge) * dq/dp, with dq/dp = A^T u / q.
+            // dc/dp = -6 t (1 - t) * steepness * dq/dp, with dq/dp = A^T u / q.
             dvec3 slope(0.0);
             if (t < 1 && q > 0) {
                 const dvec3 w = u * s.inverse_radii;
                 slope = dvec3(w.x, s.cosine * w.y - s.sine * w.z, s.sine * w.y + s.cosine * w.z) *
-                        (-6 * t * (1 - t) * s.size / (edge_ * q));
+                        (-6 * t * (1 - t) * s.steepness / q);
             }
             g = (1 - c) * g + (s.hounsfield - v) * slope;
             v = (1 - c) * v + c * s.hounsfield;
@@ -239,8 +242,8 @@ class CtHead final : public Field {
     }
 
   private:
-    double outer_q(const Shape& s) const { return (1 + 0.5 * edge_ / s.size) * (1 + 1e-9); }
-    double inner_q(const Shape& s) const { return (1 - 0.5 * edge_ / s.size) * (1 - 1e-9); }
+    static double outer_q(const Shape& s) { return (1 + 0.5 / s.steepness) * (1 + 1e-9); }
+    static double inner_q(const Shape& s) { return (1 - 0.5 / s.steepness) * (1 - 1e-9); }
     // Half of the row's length within q, 0 where the row passes by.
     static double half_width(const Shape& s, double q, double rest) {
         return q > 0 && q * q > rest ? std::sqrt(q * q - rest) / s.inverse_radii.x : 0;
@@ -248,14 +251,13 @@ class CtHead final : public Field {
     static std::size_t first_above(std::span<const double> x, double at) {
         return std::size_t(std::upper_bound(x.begin(), x.end(), at) - x.begin());
     }
-    void paint(const Shape& s, double rest, std::span<const double> x, std::size_t from,
-               std::size_t to, double* out) const {
+    static void paint(const Shape& s, double rest, std::span<const double> x, std::size_t from,
+                      std::size_t to, double* out) {
         if (from < to)
-            paint_edge(x.data() + from, to - from, s.centre.x, s.inverse_radii.x, rest, s.size,
-                       1 / edge_, s.hounsfield, out + from);
+            paint_edge(x.data() + from, to - from, s.centre.x, s.inverse_radii.x, rest, s.steepness,
+                       s.hounsfield, out + from);
     }
 
-    double edge_;
     std::vector<Shape> shapes_;
 };
 
