@@ -1,0 +1,47 @@
+// The commands of the command line. Each returns the exit status: 0 when everything asked for is
+// there, 1 when something is wrong with the input, 130 after Ctrl-C. Errors are thrown to main().
+#pragma once
+
+#include <filesystem>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+namespace voxloom::cli {
+
+struct RunArguments {
+    std::filesystem::path graph;
+    std::vector<std::string> overrides;      // NODE.PARAM=VALUE
+    std::vector<std::string> outputs;        // NODE.PORT or NODE instead of the graph's
+    std::filesystem::path out = "out";
+    std::filesystem::path report;            // empty: none
+    bool json = false;
+    bool quiet = false;
+    int threads = 0;
+    int repeat = 1;
+    double cache_gib = 4;
+};
+int run(const RunArguments& arguments, std::stop_token stop);
+
+struct CheckArguments {
+    std::filesystem::path graph;
+    std::vector<std::string> overrides;
+    bool json = false;
+};
+int check(const CheckArguments& arguments);
+
+struct NodesArguments {
+    std::string type;                        // empty: list all
+    bool json = false;
+    std::filesystem::path markdown;          // folder to write a page a node to
+};
+int nodes(const NodesArguments& arguments);
+
+struct InfoArguments {
+    std::filesystem::path file;
+    bool values = false;                     // read the voxels: range, mean, share of zeros
+    bool json = false;
+};
+int info(const InfoArguments& arguments, std::stop_token stop);
+
+}  // namespace voxloom::cli

@@ -1,0 +1,111 @@
+// voxloom: the command line.
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <csignal>
+#include <cstdio>
+#include <thread>
+
+#include "app/cli/commands.h"
+#include "core/base/error.h"
+
+namespace {
+
+using namespace voxloom;
+
+constexpr const char* kFooter = R"(
+A graph is a YAML file of nodes: what reads, what compresses, what draws. Begin with
+  voxloom run graphs/first-look.yaml                      run a graph, pictures go to out/
+  voxloom run graphs/first-look.yaml --set ct.path=my.nrrd  ... on your own volume
+  voxloom nodes                                           what there is to wire
+  voxloom nodes slicer.render                             how to use one
+  voxloom check graphs/first-look.yaml                    every problem, with its line
+  voxloom info my.nrrd                                    what is in a file
+Results go to standard output, progress and messages to standard error.)";
+
+// Ctrl-C asks the run to stop; a second one ends the program at once.
+std::stop_source stop_source;
+
+void watch_interrupts() {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGINT);
+    sigaddset(&set, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &set, nullptr);  // before any other thread begins
+    std::thread([set] {
+        for (;;) {
+            int signal = 0;
+            if (sigwait(&set, &signal) != 0) return;
+            if (stop_source.stop_requested()) std::_Exit(130);
+            stop_source.request_stop();
+        }
+    }).detach();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    watch_interrupts();
+    CLI::App app{"voxloom: compress, explore and render large volumes with graphs of nodes"};
+    app.set_version_flag("--version", std::string("voxloom ") + VOXLOOM_VERSION);
+    app.require_subcommand(1);
+    app.footer(kFooter);
+    int status = 0;
+
+    cli::RunArguments run;
+    CLI::App* command = app.add_subcommand("run", "Run a graph");
+    command->add_option("graph", run.graph, "The graph (YAML)")->required();
+    command->add_option("--set", run.overrides,
+                        "NODE.PARAM=VALUE: another value for this run; paths are taken from here");
+    command->add_option("--output", run.outputs,
+                        "NODE.PORT or NODE: what to compute, instead of the graph's outputs");
+    command->add_option("--out", run.out, "Folder for results")->capture_default_str();
+    command->add_option("--report", run.report, "Write what every node did to this file (JSON)");
+    command->add_option("--threads", run.threads, "Worker threads; 0: all cores")
+        ->check(CLI::Range(0, 1024))->capture_default_str();
+    command->add_option("--repeat", run.repeat, "Run this many times, nothing kept between; the last one is reported")
+        ->check(CLI::Range(1, 1000000))->capture_default_str();
+    command->add_option("--cache", run.cache_gib, "Memory for results, in GiB")
+        ->check(CLI::Range(0.0, 1e6))->capture_default_str();
+    command->add_flag("--json", run.json, "The report on standard output");
+    command->add_flag("--quiet", run.quiet, "No progress");
+    command->footer("Images, tables and volumes are written to the --out folder as NODE.PORT.ext.\n"
+                    "Example: voxloom run graphs/first-look.yaml --set view.size=[1024,1024] --out pictures");
+    command->callback([&] { status = cli::run(run, stop_source.get_token()); });
+
+    cli::CheckArguments check;
+    command = app.add_subcommand("check", "Find every problem of a graph without running it");
+    command->add_option("graph", check.graph, "The graph (YAML)")->required();
+    command->add_option("--set", check.overrides, "NODE.PARAM=VALUE, as for run");
+    command->add_flag("--json", check.json, "Problems and descriptions as JSON");
+    command->callback([&] { status = cli::check(check); });
+
+    cli::NodesArguments nodes;
+    command = app.add_subcommand("nodes", "List the nodes there are, or tell how to use one");
+    command->add_option("type", nodes.type, "A node type, such as slicer.render");
+    command->add_flag("--json", nodes.json, "Whole descriptions as JSON");
+    command->add_option("--markdown", nodes.markdown, "Write a page a node to this folder");
+    command->callback([&] { status = cli::nodes(nodes); });
+
+    cli::InfoArguments info;
+    command = app.add_subcommand("info", "Tell what is in a volume or a compressed file");
+    command->add_option("file", info.file, "A file, or a folder of DICOM or TIFF slices")->required();
+    command->add_flag("--values", info.values, "Read the voxels too: range, mean, share of zeros");
+    command->add_flag("--json", info.json, "As JSON");
+    command->callback([&] { status = cli::info(info, stop_source.get_token()); });
+
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& e) {
+        return app.exit(e) == 0 ? 0 : 2;
+    } catch (const Cancelled&) {
+        fmt::print(stderr, "voxloom: cancelled\n");
+        status = 130;
+    } catch (const std::exception& e) {
+        fmt::print(stderr, "{}\n", e.what());
+        status = 1;
+    }
+    std::fflush(stdout);
+    return status;
+}
