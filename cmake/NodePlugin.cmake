@@ -1,9 +1,19 @@
-# add_node_plugin(NAME SOURCES ... [LINK ...] [INCLUDE ...] [TESTS ...] [TEST_LINK ...] [BENCHMARKS ...])
+# Everything that `unit` tests need, in one target: built and run under the sanitizers too.
+add_custom_target(plugins)
+add_custom_target(unit-tests DEPENDS plugins)
+
+# add_node_plugin(NAME [OPENGL] SOURCES ... [LINK ...] [INCLUDE ...] [TESTS ...] [TEST_LINK ...]
+#                 [BENCHMARKS ...])
 #
 # One folder, one shared library with one exported function. The sources are compiled once, as an
-# object library, so that the plugin's own unit tests reach what the library hides.
+# object library, so that the plugin's own unit tests reach what the library hides. OPENGL: the
+# plugin draws; it is left out where there is no OpenGL, and its tests do not count as unit tests.
 function(add_node_plugin name)
-  cmake_parse_arguments(P "" "" "SOURCES;LINK;INCLUDE;TESTS;TEST_LINK;BENCHMARKS" ${ARGN})
+  cmake_parse_arguments(P "OPENGL" "" "SOURCES;LINK;INCLUDE;TESTS;TEST_LINK;BENCHMARKS" ${ARGN})
+  if(P_OPENGL AND NOT VOXLOOM_OPENGL)
+    skip_node_plugin(${name} "it draws, and VOXLOOM_OPENGL is off")
+    return()
+  endif()
 
   add_library(${name}-objects OBJECT ${P_SOURCES})
   target_link_libraries(${name}-objects PUBLIC voxloom-core ${P_LINK})
@@ -17,12 +27,17 @@ function(add_node_plugin name)
                         LIBRARY_OUTPUT_DIRECTORY ${VOXLOOM_PLUGIN_DIR})
   install(TARGETS ${name} LIBRARY DESTINATION lib/voxloom/plugins)
   set_property(GLOBAL APPEND PROPERTY VOXLOOM_PLUGINS ${name})
+  add_dependencies(plugins ${name})
 
   if(VOXLOOM_TESTS AND P_TESTS)
     add_executable(test-${name} ${P_TESTS})
     target_link_libraries(test-${name} PRIVATE ${name}-objects voxloom-testing GTest::gtest_main
                           ${P_TEST_LINK})
-    voxloom_discover_tests(test-${name})
+    if(P_OPENGL)
+      voxloom_discover_tests(test-${name} opengl)
+    else()
+      voxloom_discover_tests(test-${name})
+    endif()
   endif()
   if(VOXLOOM_BENCHMARKS AND P_BENCHMARKS)
     add_executable(bench-${name} ${P_BENCHMARKS})
@@ -45,9 +60,17 @@ function(print_plugin_summary)
   endforeach()
 endfunction()
 
-# Every test runs from the source folder, finds the built plugins, and has a time limit.
+# Every test runs from the source folder, finds the built plugins, and has a time limit. `label`:
+# unit (the default: no OpenGL, runs under every sanitizer) or opengl.
 function(voxloom_discover_tests target)
+  set(label unit)
+  if(ARGC GREATER 1)
+    set(label ${ARGV1})
+  endif()
+  if(label STREQUAL "unit")
+    add_dependencies(unit-tests ${target})
+  endif()
   gtest_discover_tests(${target} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
     DISCOVERY_TIMEOUT 60 TEST_PREFIX "${target}."
-    PROPERTIES TIMEOUT 300 ENVIRONMENT "VOXLOOM_PLUGIN_PATH=${VOXLOOM_PLUGIN_DIR}")
+    PROPERTIES LABELS ${label} TIMEOUT 300 ENVIRONMENT "VOXLOOM_PLUGIN_PATH=${VOXLOOM_PLUGIN_DIR}")
 endfunction()
