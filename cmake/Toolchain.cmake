@@ -24,6 +24,10 @@ add_library(voxloom-options INTERFACE)
 target_include_directories(voxloom-options INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(voxloom-options INTERFACE -Wall -Wextra -Wpedantic -Wshadow
                        -Wnon-virtual-dtor -Woverloaded-virtual -Wcast-qual)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC 12 warns about std::string's own operator+ (its bug 105651).
+  target_compile_options(voxloom-options INTERFACE -Wno-restrict)
+endif()
 if(VOXLOOM_WERROR)
   target_compile_options(voxloom-options INTERFACE -Werror)
 endif()

@@ -20,9 +20,9 @@ bool opens_files(const NodeType& type) {
 
 // A graph of one node that opens the file.
 Plan plan_to_open(const NodeType& type, const std::filesystem::path& file, const Registry& registry) {
-    Document document;
-    document.add_node("file", type.id);
-    document.set_param("file", "path", std::filesystem::absolute(file).string());
+    const std::string path = to_yaml(std::filesystem::absolute(file).string());
+    const Document document = Document::parse("voxloom: 1\nnodes:\n  - { id: file, type: " + type.id +
+                                              ", set: { path: " + path + " } }\n");
     return voxloom::check(document.graph(), registry);
 }
 

@@ -39,7 +39,7 @@ void ProgressLine::show(const std::string& line) {
     if (now - last_ns_ < (terminal_ ? 50'000'000 : 5'000'000'000)) return;
     last_ns_ = now;
     shown_ = true;
-    fmt::print(stderr, terminal_ ? "\r\033[K{}" : "{}\n", line);
+    fmt::print(stderr, "{}{}{}", terminal_ ? "\r\033[K" : "", line, terminal_ ? "" : "\n");
     std::fflush(stderr);
 }
 
