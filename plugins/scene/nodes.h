@@ -1,0 +1,12 @@
+// The nodes of this plugin.
+#pragma once
+
+#include "core/graph/node.h"
+
+namespace voxloom::scene {
+
+NodeType camera_node();
+NodeType transfer_node();
+NodeType lights_node();
+
+}  // namespace voxloom::scene
