@@ -19,6 +19,7 @@ struct RunArguments {
     bool quiet = false;
     int threads = 0;
     int repeat = 1;
+    std::vector<std::string> again;          // nodes that a repetition computes anew
     double cache_gib = 4;
 };
 int run(const RunArguments& arguments, std::stop_token stop);

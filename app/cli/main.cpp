@@ -64,8 +64,11 @@ int main(int argc, char** argv) {
     command->add_option("--report", run.report, "Write what every node did to this file (JSON)");
     command->add_option("--threads", run.threads, "Worker threads; 0: all cores")
         ->check(CLI::Range(0, 1024))->capture_default_str();
-    command->add_option("--repeat", run.repeat, "Run this many times, nothing kept between; the last one is reported")
+    command->add_option("--repeat", run.repeat,
+                        "Run this many times, for timing: the nodes that draw (or those of --again) "
+                        "are computed anew, the others kept; the report lists every time")
         ->check(CLI::Range(1, 1000000))->capture_default_str();
+    command->add_option("--again", run.again, "NODE: what --repeat computes anew");
     command->add_option("--cache", run.cache_gib, "Memory for results, in GiB")
         ->check(CLI::Range(0.0, 1e6))->capture_default_str();
     command->add_flag("--json", run.json, "The report on standard output");

@@ -74,18 +74,31 @@ std::vector<Saver> add_savers(Plan& plan, const Registry& registry) {
     return savers;
 }
 
+int node_named(const Plan& plan, std::string_view id, std::string_view option) {
+    const int node = plan.find(id);
+    if (node >= 0) return node;
+    std::vector<std::string> ids;
+    for (const Plan::Node& n : plan.nodes) ids.push_back(n.id);
+    fail("{}: the graph has no node '{}'{}", option, id, did_you_mean(id, ids));
+}
+
+// What --repeat computes anew: the nodes named by --again, else all that draw.
+std::vector<int> nodes_to_repeat(const Plan& plan, const std::vector<std::string>& again) {
+    std::vector<int> nodes;
+    for (const std::string& id : again) nodes.push_back(node_named(plan, id, "--again"));
+    if (again.empty())
+        for (std::size_t i = 0; i < plan.nodes.size(); ++i)
+            if (plan.nodes[i].ok && plan.nodes[i].type->thread == NodeType::Thread::opengl)
+                nodes.push_back(int(i));
+    return nodes;
+}
+
 void select_outputs(Plan& plan, const std::vector<std::string>& outputs) {
     if (outputs.empty()) return;
     plan.wanted.clear();
     for (const std::string& name : outputs) {
         const std::size_t dot = name.find('.');
-        const int node = plan.find(std::string_view(name).substr(0, dot));
-        if (node < 0) {
-            std::vector<std::string> ids;
-            for (const Plan::Node& n : plan.nodes) ids.push_back(n.id);
-            fail("--output {}: the graph has no node '{}'{}", name, name.substr(0, dot),
-                 did_you_mean(name.substr(0, dot), ids));
-        }
+        const int node = node_named(plan, std::string_view(name).substr(0, dot), "--output " + name);
         int output = -1;
         if (const NodeType* type = plan.nodes[std::size_t(node)].type;
             type && dot != std::string::npos) {
@@ -110,7 +123,7 @@ std::string measurements_text(const NodeReport& report) {
     return text;
 }
 
-void print_summary(const Plan& plan, const RunResult& result) {
+void print_summary(const RunResult& result) {
     std::size_t width = 4;
     for (const NodeReport& r : result.nodes)
         if (r.state != NodeState::not_asked) width = std::max(width, r.id.size());
@@ -123,21 +136,19 @@ void print_summary(const Plan& plan, const RunResult& result) {
         if (std::string text = measurements_text(r); !text.empty()) line += "  " + text;
         fmt::print("{}\n", line);
     }
-    (void)plan;
 }
 
 // Errors and warnings, as sentences, on standard error.
 void print_messages(const Plan& plan, const RunResult& result) {
     for (std::size_t i = 0; i < result.nodes.size(); ++i) {
         const NodeReport& r = result.nodes[i];
-        const Problem at{plan.nodes[i].mark, r.id, "", ""};
-        for (const std::string& warning : r.warnings)
-            fmt::print(stderr, "{}warning: {}\n", Problem{at.mark, r.id, "", ""}.text(plan.file), warning);
-        if (r.state == NodeState::failed || (r.state == NodeState::not_run && !r.error.empty()))
-            fmt::print(stderr, "{}\n",
-                       Problem{at.mark, r.id, "",
-                               r.state == NodeState::failed ? r.error : "not run: " + r.error}
-                           .text(plan.file));
+        auto say = [&](const std::string& sentence) {
+            fmt::print(stderr, "{}\n", Problem{plan.nodes[i].mark, r.id, "", sentence}.text(plan.file));
+        };
+        for (const std::string& warning : r.warnings) say("warning: " + warning);
+        if (r.state == NodeState::failed) say(r.error);
+        // What the check found was said before.
+        if (r.state == NodeState::not_run && plan.nodes[i].ok) say("not run: " + r.error);
     }
 }
 
@@ -155,25 +166,27 @@ int run(const RunArguments& arguments, std::stop_token stop) {
     const std::vector<Saver> savers = add_savers(plan, registry);
 
     ResultCache cache(std::uint64_t(arguments.cache_gib * double(1 << 30)));
+    RunOptions options;
+    options.stop = stop;
+    options.output_folder = arguments.out;
+    options.threads = arguments.threads;
     RunResult result;
+    std::vector<RunResult> earlier;
     for (int i = 0; i < arguments.repeat; ++i) {
+        if (i == 1) options.again = nodes_to_repeat(plan, arguments.again);
+        if (i > 0) earlier.push_back(std::move(result));
         ProgressLine progress(arguments.quiet);
-        RunOptions options;
-        options.stop = stop;
         options.observer = &progress;
-        options.output_folder = arguments.out;
-        options.threads = arguments.threads;
-        if (i > 0) cache.clear();
         result = evaluate(plan, cache, options);
         if (!result.ok) break;
     }
     print_messages(plan, result);
-    const std::string report = run_to_json(plan, result);
+    const std::string report = run_to_json(plan, result, earlier);
     if (!arguments.report.empty()) write_text_file(arguments.report, report);
     if (arguments.json) {
         fmt::print("{}", report);
     } else {
-        print_summary(plan, result);
+        print_summary(result);
         for (const Saver& saver : savers)
             if (result.nodes[std::size_t(saver.node)].state == NodeState::done)
                 fmt::print("{}\n", (arguments.out / saver.file).string());

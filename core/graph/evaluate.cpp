@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cassert>
 #include <condition_variable>
@@ -228,7 +229,9 @@ void Run::prepare() {
         ++unfinished_;
         reports_[i].state = NodeState::waiting;
         if (!node.ok) continue;
-        if (!node.type->writes_files && node.type->cacheable) run.result = cache_.find(run.key);
+        const bool again = std::ranges::find(options_.again, int(i)) != options_.again.end();
+        if (!node.type->writes_files && node.type->cacheable && !again)
+            run.result = cache_.find(run.key);
         if (run.result) continue;
         for (const auto& sources : node.inputs)
             for (const Plan::Source& source : sources) {

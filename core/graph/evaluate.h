@@ -93,6 +93,7 @@ struct RunOptions {
     std::filesystem::path output_folder = "out";
     int threads = 0;                   // 0: all cores
     std::vector<Plan::Source> wanted;  // instead of the plan's, when not empty
+    std::vector<int> again;            // nodes to compute although the cache has their result
 };
 
 // Runs what is asked for, branches in parallel. Blocks the calling thread, which must not be the

@@ -143,9 +143,28 @@ Json port_json(const PortSpec& port, bool input) {
     return j;
 }
 
+// Times of every node that ran more than once.
+Json repeats_json(const RunResult& last, const std::vector<RunResult>& earlier) {
+    Json repeats = Json::object();
+    for (std::size_t i = 0; i < last.nodes.size(); ++i) {
+        Json wall = Json::array(), draw = Json::array();
+        auto add = [&](const RunResult& run) {
+            if (run.nodes[i].state != NodeState::done) return;
+            wall.push_back(run.nodes[i].wall_seconds);
+            draw.push_back(run.nodes[i].draw_seconds);
+        };
+        for (const RunResult& run : earlier) add(run);
+        add(last);
+        if (wall.size() > 1)
+            repeats[last.nodes[i].id] = {{"wall_seconds", wall}, {"draw_seconds", draw}};
+    }
+    return repeats;
+}
+
 }  // namespace
 
-std::string run_to_json(const Plan& plan, const RunResult& result) {
+std::string run_to_json(const Plan& plan, const RunResult& result,
+                        const std::vector<RunResult>& earlier) {
     Json j;
     j["graph"] = plan.file.string();
     j["ok"] = result.ok;
@@ -155,6 +174,7 @@ std::string run_to_json(const Plan& plan, const RunResult& result) {
     j["peak_resident_bytes"] = result.peak_resident_bytes;
     j["problems"] = Json::array();
     for (const Problem& p : plan.problems) j["problems"].push_back(problem_json(plan, p));
+    if (!earlier.empty()) j["repeats"] = repeats_json(result, earlier);
     j["nodes"] = Json::array();
     for (std::size_t i = 0; i < result.nodes.size(); ++i) {
         const NodeReport& r = result.nodes[i];

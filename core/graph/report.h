@@ -7,8 +7,10 @@
 
 namespace voxloom {
 
-// What a run did, node by node: docs/report.md names every field.
-std::string run_to_json(const Plan& plan, const RunResult& result);
+// What a run did, node by node: docs/report.md names every field. `earlier` are the runs of the same
+// plan before it (voxloom run --repeat), whose times are listed.
+std::string run_to_json(const Plan& plan, const RunResult& result,
+                        const std::vector<RunResult>& earlier = {});
 // Every problem of a check, with file, line and column.
 std::string problems_to_json(const Plan& plan);
 // Everything that a node says of itself.
