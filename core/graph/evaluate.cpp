@@ -1,6 +1,8 @@
 #include "core/graph/evaluate.h"
 
 #include <sys/resource.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -110,7 +112,9 @@ class Run {
     Run(const Plan& plan, ResultCache& cache, const RunOptions& options)
         : plan_(plan), cache_(cache), options_(options),
           wanted_(options.wanted.empty() ? plan.wanted : options.wanted),
-          runs_(plan.nodes.size()), arena_(concurrency(options), 0), gl_arena_(concurrency(options), 1) {}
+          runs_(plan.nodes.size()), workers_(tbb::global_control::max_allowed_parallelism,
+                                             std::size_t(concurrency(options)) + 1),
+          arena_(concurrency(options), 0), gl_arena_(concurrency(options), 1) {}
 
     RunResult operator()();
 
@@ -118,7 +122,7 @@ class Run {
     friend class NodeEvaluation;
 
     static int concurrency(const RunOptions& options) {
-        return options.threads > 0 ? options.threads : tbb::task_arena::automatic;
+        return options.threads > 0 ? options.threads : tbb::info::default_concurrency();
     }
 
     void prepare();
@@ -139,6 +143,8 @@ class Run {
     const std::vector<Plan::Source> wanted_;
     std::vector<NodeRun> runs_;
     std::vector<NodeReport> reports_;
+    // One more than work: the thread that asked only waits, but TBB counts it.
+    tbb::global_control workers_;
     tbb::task_arena arena_, gl_arena_;  // the second one is for loops inside drawing nodes
 
     std::mutex mutex_;

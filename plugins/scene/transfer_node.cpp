@@ -6,6 +6,7 @@
 
 #include "core/base/text.h"
 #include "plugins/scene/data_range.h"
+#include "plugins/scene/materials.h"
 #include "plugins/scene/nodes.h"
 #include "plugins/scene/presets.h"
 
@@ -41,6 +42,9 @@ per voxel. An opacity of 1 is read as 1 - 2^-24. `opacity_scale` makes everythin
   crossing one where the values change by a tenth of their range per reference length. Steeper
   borders look thinner. The narrower the peaks, the more a renderer must get right: this is the scene
   in which errors of sampling and classification are compared.
+* `materials`: for data that nobody has looked at yet. Three boundaries part the values into four
+  classes (Otsu's criterion on the square root of the histogram); the first two are drawn as
+  translucent skins, what lies above the third is nearly solid. `domain` has no effect on it.
 * `ct-bone`, `ct-soft-tissue`, `ct-lung`, `ct-vessels` are in Hounsfield units whatever `domain` is;
   where the scanner stored values from 0, set `value_offset: 1024`. `mr-head` is relative.
 
@@ -78,7 +82,8 @@ bool range_is_given(const Params& p) {
 bool needs_range(const Params& p) {
     const Preset* preset = find_preset(p.text("preset"));
     bool one_needs = preset ? preset->relative
-                            : is_relative(p) || p.text("preset") == "isosurfaces";
+                            : is_relative(p) || p.text("preset") == "isosurfaces" ||
+                                  p.text("preset") == "materials";
     return one_needs || !p.rows("widgets").empty();
 }
 
@@ -114,6 +119,27 @@ std::vector<ControlPoint> points_of(const Params& p, const Axis& axis) {
 std::vector<ControlPoint> ramp_of(const Params& p, const Axis& axis) {
     return {{axis(p.real("ramp_start")), 0, {}},
             {axis(p.real("ramp_end")), p.real("ramp_opacity"), {}}};
+}
+
+// A translucent skin at each boundary but the last, nearly solid above that one.
+std::vector<ControlPoint> materials(Evaluation& ev, const ValueRange& range) {
+    const std::vector<double> ends = material_boundaries(ev.value("fit"), range, 3, ev.stop());
+    const glm::dvec3 colors[] = {{0.85, 0.50, 0.36}, {0.95, 0.72, 0.45}, {1.0, 0.97, 0.90}};
+    const double skin[] = {0.035, 0.10, 0.45};
+    const double inside[] = {0.0015, 0.012, 0.45};
+    std::vector<ControlPoint> points;
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+        const double below = i > 0 ? ends[i - 1] : range.min;
+        const double above = i + 1 < ends.size() ? ends[i + 1] : range.max;
+        const double half = 0.35 * std::min(ends[i] - below, above - ends[i]);
+        const double before = i > 0 ? inside[i - 1] : 0;
+        const glm::dvec3 color_before = i > 0 ? colors[i - 1] : colors[0];
+        points.push_back({ends[i] - half, before, color_before});
+        points.push_back({ends[i], skin[i], colors[i]});
+        points.push_back({ends[i] + half, inside[i], colors[i]});
+        ev.measure(fmt::format("boundary_{}", i + 1), ends[i]);
+    }
+    return points;
 }
 
 std::vector<ControlPoint> preset_points(const Preset& preset, const Axis& axis) {
@@ -229,6 +255,8 @@ void describe_transfer(Description& d) {
     check_rows("widgets", problem_with_widget);
     if (p.text("preset") == "none" && p.rows("points").empty())
         d.problem("there is no point; give at least one, [value, opacity]", "points");
+    if (p.text("preset") == "materials" && !d.input("fit"))
+        d.problem("preset materials looks at the data: wire it to 'fit'", "preset");
     const auto& range = p.numbers("range");
     if (range[0] > range[1])
         d.problem(fmt::format("goes from {} down to {}; swap them", shortest(range[0]),
@@ -256,6 +284,7 @@ void evaluate_transfer(Evaluation& ev) {
     } else {
         const auto points = preset           ? preset_points(*preset, axis)
                             : name == "ramp" ? ramp_of(p, axis)
+                            : name == "materials" ? materials(ev, range)
                                              : points_of(p, axis);
         f.one = through_points(points, coloring_of(p, range, points), density);
     }
@@ -270,7 +299,7 @@ void evaluate_transfer(Evaluation& ev) {
 }
 
 std::vector<std::string> preset_names() {
-    std::vector<std::string> names{"none", "ramp", "isosurfaces"};
+    std::vector<std::string> names{"none", "ramp", "isosurfaces", "materials"};
     for (const Preset& preset : presets()) names.emplace_back(preset.name);
     return names;
 }
