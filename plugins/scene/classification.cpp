@@ -85,17 +85,21 @@ TransferFunction1D sum_of_peaks(std::span<const Peak> peaks) {
     return f;
 }
 
-double Shape::weight(double value, double gradient_magnitude) const {
+double Shape::mean(double a, double b, double gradient_magnitude) const {
     if (gradient_magnitude < gradient.min || gradient_magnitude > gradient.max) return 0;
-    double t = (gradient_magnitude - gradient.min) / gradient.extent();
-    double lo = std::lerp(bottom.min, top.min, t), hi = std::lerp(bottom.max, top.max, t);
-    if (!(lo <= value && value <= hi)) return 0;
-    auto rise = [&](double to_border) {  // 0 at the border, 1 in the middle
-        return edge > 0 ? std::min(1.0, to_border / edge) : 1.0;
+    const double t = (gradient_magnitude - gradient.min) / gradient.extent();
+    const double lo = std::lerp(bottom.min, top.min, t), hi = std::lerp(bottom.max, top.max, t);
+    if (!(lo < hi)) return 0;
+    const double middle = 0.5 * (lo + hi), half = 0.5 * (hi - lo);
+    // Integral from 0 to u of min(1, (1 - |u|)/edge), u from -1 to 1 across the shape.
+    auto integral = [&](double value) {
+        double u = std::clamp((value - middle) / half, -1.0, 1.0), d = 1 - std::abs(u);
+        double area = d >= edge ? std::abs(u) : 1 - edge + (edge * edge - d * d) / (2 * edge);
+        return std::copysign(area, u);
     };
-    double half = 0.5 * (hi - lo);
-    double across = half > 0 ? 1 - std::abs(value - 0.5 * (lo + hi)) / half : 1;
-    return rise(across) * rise(1 - std::abs(2 * t - 1));
+    const double along = 1 - std::abs(2 * t - 1);  // 0 at the lower and the upper border
+    const double fade = along < edge ? along / edge : 1;
+    return fade * half * (integral(b) - integral(a)) / (b - a);
 }
 
 namespace {
@@ -108,19 +112,18 @@ ValueRange grid_range(ValueRange shapes, ValueRange limit, int nodes) {
     return range.min < range.max ? range : ValueRange{shapes.min - cell, shapes.max + cell};
 }
 
-// Where the middle of sub-sample k of n lies in the cell about node i; the cells of the first and
-// the last node are cut in half by the grid's end.
-double sub_sample(const ValueRange& range, int nodes, int i, int k, int n) {
+// The cell about node i; those of the first and the last node are cut in half by the grid's end.
+ValueRange cell_of(const ValueRange& range, int nodes, int i) {
     double cell = range.extent() / (nodes - 1);
-    double lo = std::max(i - 0.5, 0.0), hi = std::min(i + 0.5, double(nodes - 1));
-    return range.min + cell * std::lerp(lo, hi, (k + 0.5) / n);
+    return {range.min + cell * std::max(i - 0.5, 0.0),
+            range.min + cell * std::min(i + 0.5, double(nodes - 1))};
 }
 
 }  // namespace
 
 TransferFunction2D rasterize(std::span<const Shape> shapes, const Domain& domain, glm::ivec2 dims,
                              const std::stop_token& stop) {
-    constexpr int kSub = 8;  // sub-samples a side
+    constexpr int kSub = 16;  // gradients a cell
     constexpr double kInf = std::numeric_limits<double>::infinity();
     ValueRange values{kInf, -kInf}, gradients{kInf, -kInf};
     for (const Shape& s : shapes) {
@@ -138,13 +141,12 @@ TransferFunction2D rasterize(std::span<const Shape> shapes, const Domain& domain
         for (int j = int(begin); j < int(end); ++j)
             for (int i = 0; i < dims.x; ++i) {
                 Emission& sample = f.samples[std::size_t(j) * std::size_t(dims.x) + std::size_t(i)];
+                const ValueRange v = cell_of(f.value, dims.x, i), g = cell_of(f.gradient, dims.y, j);
                 for (const Shape& shape : shapes) {
                     double sum = 0;
-                    for (int l = 0; l < kSub; ++l)
-                        for (int k = 0; k < kSub; ++k)
-                            sum += shape.weight(sub_sample(f.value, dims.x, i, k, kSub),
-                                                sub_sample(f.gradient, dims.y, j, l, kSub));
-                    sample += shape.emission * (sum / (kSub * kSub));
+                    for (int k = 0; k < kSub; ++k)
+                        sum += shape.mean(v.min, v.max, std::lerp(g.min, g.max, (k + 0.5) / kSub));
+                    sample += shape.emission * (sum / kSub);
                 }
             }
     }, stop);

@@ -56,7 +56,8 @@ struct Shape {
     ValueRange bottom, top, gradient;
     Emission emission;
     double edge = 1;
-    double weight(double value, double gradient_magnitude) const;  // 0 to 1
+    // Mean weight, 0 to 1, over the values from a to b (a < b) at one gradient magnitude; exact.
+    double mean(double a, double b, double gradient_magnitude) const;
 };
 // The sum of the shapes on a grid of `dims` nodes that covers them. Every sample is the mean over
 // its cell, so what is narrower than a cell keeps its integral. `domain` is where data can be: the
