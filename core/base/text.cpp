@@ -31,7 +31,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 std::string nearest_name(std::string_view wrong, std::span<const std::string> known) {
     if (wrong.size() > 100) return {};
     std::string best;
-    std::size_t best_distance = std::max<std::size_t>(1, std::min<std::size_t>(3, wrong.size() / 3)) + 1;
+    std::size_t best_distance = std::min<std::size_t>(3, (wrong.size() + 1) / 3) + 1;
     for (const std::string& name : known) {
         std::size_t distance = edit_distance(wrong, name);
         // A dotted name is often given by its last part alone: 'phantom' for 'readers.phantom'.
