@@ -1,0 +1,72 @@
+// What a shader can fetch and sample from: the GLSL belongs to the plugin that owns the data.
+//
+// Coordinates in GLSL are index coordinates of the source: voxel i sits at i. A texel is a vec4:
+//   x        value, mapped so that value = offset + scale * x (VoxelSource::offset, scale)
+//   y        validity where `has_validity`: x is then the value times validity, so that an
+//            interpolated x/y renormalises the weights of the valid voxels
+//   xyzw     RGB(A), each mapped to 0..1 by the same offset and scale, where `color`
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "core/data/value.h"
+#include "core/gpu/objects.h"
+#include "core/gpu/program.h"
+
+namespace voxloom::gpu {
+
+struct SourceTexture {
+    std::string sampler;
+    TexturePtr texture;
+};
+
+// GLSL that defines   vec4 fetch_voxel(ivec3 i)       (i is clamped to the dims by the function)
+// and, with linear,   vec4 sample_linear(vec3 p)      (p in index coordinates, clamped)
+struct VoxelSource {
+    Module glsl;
+    bool linear = false;      // without it a reconstruction pays eight fetches
+    bool color = false;
+    bool has_validity = false;
+    double offset = 0, scale = 1;
+    std::vector<SourceTexture> textures;
+};
+
+// GLSL that defines   vec4 reconstruct(vec3 p)   and   vec3 gradient(vec3 p)   itself, for data that
+// brings its own kernels (lattices). gradient is per index step, in the units of x.
+struct FieldSource {
+    VoxelSource voxels;       // its glsl holds both functions; reconstruction parameters do not apply
+};
+
+struct SourceRequest {
+    int component = 0;
+    std::stop_token stop;
+};
+
+// Answers for the values that it knows, nothing for the others. [OpenGL thread]
+using SourceProvider = std::function<std::optional<FieldSource>(const Value&, const SourceRequest&)>;
+void register_source_provider(std::string name, SourceProvider provider);
+// The first provider's answer, in order of name. [OpenGL thread]
+std::optional<FieldSource> provided_source(const Value& value, const SourceRequest& request);
+
+// The dense one: a volume in one 3-D texture. Integers of up to 16 bits keep every value exactly in
+// R16; wider types and floats become R32F over their finite range, mapped in double. Voxels that are
+// not finite or not valid take a second channel. `bytes` receives what was uploaded.
+// Throws Error when the volume exceeds the driver's limits. [OpenGL thread]
+VoxelSource upload_dense(const Volume& volume, int component, const std::stop_token& stop,
+                         std::uint64_t& bytes);
+
+// The GLSL of a dense 3-D texture, as upload_dense's: samplers and uniforms are named dense_texture,
+// dense_inverse_dims (vec3) and dense_last (ivec3, the last voxel).
+const Module& dense_module();
+
+// Uploads a dense array of vec4 computed slice by slice, for stored gradients and classified voxels:
+// fill(z, out) writes dims.x * dims.y texels; it is called from several threads.
+TexturePtr upload_computed(glm::ivec3 dims, GLenum format, std::string_view what,
+                           const std::function<void(int z, glm::vec4* out)>& fill,
+                           const std::stop_token& stop);
+
+}  // namespace voxloom::gpu

@@ -1,0 +1,144 @@
+#include "plugins/render-slicer/blocks.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/parallel.h"
+
+namespace voxloom::slicer {
+
+namespace {
+
+// Widens ranges[bx] by one row of voxels, for blocks along x. Neighbouring blocks share a voxel.
+template <class T>
+void widen_row(const T* row, const std::uint8_t* valid, const VolumeDesc& desc, int component,
+               int size, int reach, std::vector<glm::vec2>& ranges) {
+    const int n = int(desc.dims.x), stride = desc.components;
+    auto value = [&](int x) {
+        const T* v = row + std::size_t(x) * std::size_t(stride);
+        if (!desc.color) return double(v[component]);
+        return 0.2126 * double(v[0]) + 0.7152 * double(v[1]) + 0.0722 * double(v[2]);
+    };
+    for (std::size_t b = 0; b < ranges.size(); ++b) {
+        const int from = std::max(int(b) * size - reach, 0);
+        const int to = std::min((int(b) + 1) * size + reach, n - 1);
+        float lo = ranges[b].x, hi = ranges[b].y;
+        if constexpr (sizeof(T) <= 2) {
+            if (!desc.color && stride == 1 && !valid) {
+                // Integers: no conversion in the loop, which then runs in SIMD.
+                T a = row[from], z = a;
+                for (int x = from; x <= to; ++x) {
+                    a = std::min(a, row[x]);
+                    z = std::max(z, row[x]);
+                }
+                ranges[b] = {std::min(lo, float(a)), std::max(hi, float(z))};
+                continue;
+            }
+        }
+        for (int x = from; x <= to; ++x) {
+            double v = value(x);
+            if ((valid && !valid[x]) || !std::isfinite(v)) continue;
+            // Rounded outwards, so that a float range never loses a value of a wider type.
+            float below = float(v), above = below;
+            if (double(below) > v) below = std::nextafter(below, -std::numeric_limits<float>::infinity());
+            if (double(above) < v) above = std::nextafter(above, std::numeric_limits<float>::infinity());
+            lo = std::min(lo, below);
+            hi = std::max(hi, above);
+        }
+        ranges[b] = {lo, hi};
+    }
+}
+
+}  // namespace
+
+BlockRanges block_ranges(const Volume& volume, int component, int size, int reach,
+                         const std::stop_token& stop) {
+    const VolumeDesc& desc = volume.desc();
+    const std::byte* data = volume.data();
+    BlockRanges out;
+    out.size = size;
+    for (int a = 0; a < 3; ++a)
+        out.grid[a] = int(std::max<std::int64_t>(1, (desc.dims[a] - 1 + size - 1) / size));
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    out.ranges.assign(std::size_t(out.grid.x) * std::size_t(out.grid.y) * std::size_t(out.grid.z),
+                      {inf, -inf});
+    const std::size_t row_voxels = std::size_t(desc.dims.x);
+    with_type(desc.type, [&](auto t) {
+        using T = decltype(t);
+        // One layer of blocks a task; a plane of rows is read once for each row of blocks.
+        parallel_for(0, out.grid.z, 1, [&](std::int64_t lo, std::int64_t hi) {
+            std::vector<std::uint8_t> mask(desc.has_mask ? row_voxels : 0);
+            std::vector<glm::vec2> row_ranges(std::size_t(out.grid.x));
+            for (std::int64_t bz = lo; bz < hi; ++bz) {
+                const std::int64_t z0 = std::max<std::int64_t>(bz * size - reach, 0);
+                const std::int64_t z1 = std::min<std::int64_t>((bz + 1) * size + reach, desc.dims.z - 1);
+                for (std::int64_t by = 0; by < out.grid.y; ++by) {
+                    const std::int64_t y0 = std::max<std::int64_t>(by * size - reach, 0);
+                    const std::int64_t y1 =
+                        std::min<std::int64_t>((by + 1) * size + reach, desc.dims.y - 1);
+                    check_stop(stop);
+                    std::fill(row_ranges.begin(), row_ranges.end(), glm::vec2(inf, -inf));
+                    for (std::int64_t z = z0; z <= z1; ++z)
+                        for (std::int64_t y = y0; y <= y1; ++y) {
+                            if (desc.has_mask)
+                                volume.read_mask({{0, y, z}, {desc.dims.x, y + 1, z + 1}}, mask);
+                            auto row = reinterpret_cast<const T*>(data) +
+                                       (std::size_t(z) * std::size_t(desc.dims.y) + std::size_t(y)) *
+                                           row_voxels * std::size_t(desc.components);
+                            widen_row(row, desc.has_mask ? mask.data() : nullptr, desc, component, size,
+                                      reach, row_ranges);
+                        }
+                    std::copy(row_ranges.begin(), row_ranges.end(),
+                              out.ranges.begin() + (bz * out.grid.y + by) * out.grid.x);
+                }
+            }
+        }, stop);
+    });
+    if (reach > 0)
+        for (glm::vec2& r : out.ranges)
+            if (r.x < r.y) {
+                float middle = 0.5f * (r.x + r.y), half = float(kCubicOvershoot) * 0.5f * (r.y - r.x);
+                r = {middle - half, middle + half};
+            }
+    return out;
+}
+
+std::vector<std::int8_t> leaps(glm::ivec3 grid, const std::vector<std::uint8_t>& seen) {
+    // Chessboard distances are exact after one sweep forward and one back over the 13 neighbours that
+    // each has already passed, as every shortest path can be ordered so. Distances to both kinds are
+    // one field: a neighbour of the other kind is at distance 1.
+    std::vector<std::int8_t> d(seen.size(), 127);
+    auto sweep = [&](int direction) {
+        auto range = [&](int n, int i) { return direction > 0 ? i : n - 1 - i; };
+        for (int k = 0; k < grid.z; ++k)
+            for (int j = 0; j < grid.y; ++j)
+                for (int i = 0; i < grid.x; ++i) {
+                    const glm::ivec3 p(range(grid.x, i), range(grid.y, j), range(grid.z, k));
+                    const std::size_t at =
+                        (std::size_t(p.z) * std::size_t(grid.y) + std::size_t(p.y)) * std::size_t(grid.x) +
+                        std::size_t(p.x);
+                    int best = d[at];
+                    for (int n = 0; n < 13; ++n) {
+                        // The 13 offsets that come before (0,0,0) in the order of the sweep.
+                        const glm::ivec3 o(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+                        const glm::ivec3 q = p + direction * o;
+                        if (glm::any(glm::lessThan(q, glm::ivec3(0))) ||
+                            glm::any(glm::greaterThanEqual(q, grid)))
+                            continue;
+                        const std::size_t from =
+                            (std::size_t(q.z) * std::size_t(grid.y) + std::size_t(q.y)) *
+                                std::size_t(grid.x) + std::size_t(q.x);
+                        best = std::min(best, seen[from] == seen[at] ? d[from] + 1 : 1);
+                    }
+                    d[at] = std::int8_t(best);
+                }
+    };
+    sweep(1);
+    sweep(-1);
+    for (std::size_t i = 0; i < d.size(); ++i)
+        if (!seen[i]) d[i] = std::int8_t(-d[i]);
+    return d;
+}
+
+}  // namespace voxloom::slicer

@@ -1,0 +1,4 @@
+// Classified at the voxels, then interpolated: the texture holds optical depth and colour of one slab.
+struct Sample { vec4 emission; };
+Sample observe(vec3 p) { return Sample(max(classified_reconstruct(p), 0.0)); }
+vec4 slab(Sample f, Sample b) { return 0.5 * (f.emission + b.emission); }

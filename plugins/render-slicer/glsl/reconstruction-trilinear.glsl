@@ -1,0 +1,1 @@
+vec4 reconstruct(vec3 p) { return sample_linear(p); }

@@ -1,0 +1,62 @@
+// What drawing needs again for the next camera: textures, tables, ranges.
+//
+// Everything is kept under the object that it was made from and a key, within a byte limit, least
+// recently used out first; what was made from an object that is gone goes with it. Used on the OpenGL
+// thread alone, where textures may die at once.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+
+#include "core/base/hash.h"
+
+namespace voxloom::slicer {
+
+class Keep {
+  public:
+    static Keep& instance() {
+        static Keep& keep = *new Keep;  // outlives the OpenGL thread, whose end frees its objects
+        return keep;
+    }
+
+    // The thing of `key` made from `owner`, or make(bytes) -> shared_ptr<T>, which adds what it holds.
+    template <class T, class Make>
+    std::shared_ptr<const T> get(const std::shared_ptr<const void>& owner, const Hash& key,
+                                 const Make& make) {
+        for (auto it = entries_.begin(); it != entries_.end(); ++it)
+            if (it->key == key && same_owner(it->owner, owner)) {
+                entries_.splice(entries_.begin(), entries_, it);
+                return std::static_pointer_cast<const T>(it->thing);
+            }
+        std::uint64_t bytes = 0;
+        std::shared_ptr<const T> thing = make(bytes);
+        entries_.push_front({owner, key, thing, bytes});
+        return thing;
+    }
+
+    // Drops what is over the limit or has lost its owner.
+    void shrink(std::uint64_t byte_limit) {
+        entries_.remove_if([](const Entry& e) { return e.owner.expired(); });
+        std::uint64_t held = 0;
+        for (const Entry& e : entries_) held += e.bytes;
+        while (held > byte_limit && !entries_.empty()) {
+            held -= entries_.back().bytes;
+            entries_.pop_back();
+        }
+    }
+
+  private:
+    struct Entry {
+        std::weak_ptr<const void> owner;
+        Hash key;
+        std::shared_ptr<const void> thing;
+        std::uint64_t bytes;
+    };
+    static bool same_owner(const std::weak_ptr<const void>& a, const std::shared_ptr<const void>& b) {
+        return !a.owner_before(b) && !b.owner_before(a);
+    }
+    std::list<Entry> entries_;
+};
+
+}  // namespace voxloom::slicer

@@ -1,0 +1,568 @@
+#include "plugins/render-slicer/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/base/meter.h"
+#include "core/data/brick_cache.h"
+#include "core/gpu/source.h"
+#include "core/gpu/thread.h"
+#include "plugins/render-slicer/blocks.h"
+#include "plugins/render-slicer/keep.h"
+#include "plugins/render-slicer/modules.h"
+#include "plugins/render-slicer/tables.h"
+#include "plugins/render-slicer/view.h"
+#include "plugins/render-slicer/voxels.h"
+
+namespace voxloom::slicer {
+
+namespace {
+
+using gpu::Module;
+using gpu::TexturePtr;
+using S = Settings;
+
+// A loop in a shader may end after 2^16 turns on some drivers; blocks to leap over count as well.
+constexpr double kMostPlanes = 20000;
+constexpr int kEmissionBins = 4096;
+
+template <class... Parts>
+Hash key(std::string_view what, Parts... parts) {
+    Hasher h;
+    h.text(what);
+    (h.value(parts), ...);
+    return h.finish();
+}
+Hash key(std::string_view what, const Hash& a, const Hash& b) {
+    return Hasher().text(what).hash(a).hash(b).finish();
+}
+
+// --- what is prepared from the data ------------------------------------------------------------
+
+// The source as a dense volume in memory, kept for as long as the source lives.
+VolumePtr dense(const Value& source, const std::shared_ptr<const void>& owner, Evaluation& ev) {
+    if (auto* v = std::get_if<VolumePtr>(&source); v && (*v)->data()) return *v;
+    struct Held {
+        VolumePtr volume;
+    };
+    auto held = Keep::instance().get<Held>(owner, key("dense"), [&](std::uint64_t& bytes) {
+        auto out = std::make_shared<Held>();
+        if (auto* v = std::get_if<VolumePtr>(&source)) {
+            out->volume = in_memory(*v, ev.stop(),
+                                    [&](double f) { ev.progress(0.5 * f, "reading the volume"); });
+        } else {
+            const BricksPtr& bricks = std::get<BricksPtr>(source);
+            const VolumeDesc& desc = bricks->desc().volume;
+            Buffer voxels(desc.dense_bytes(), "decoded volume");
+            const std::uint64_t slice =
+                std::uint64_t(desc.dims.x) * std::uint64_t(desc.dims.y) * desc.voxel_bytes();
+            const std::int64_t step = bricks->desc().brick.z;
+            for (std::int64_t z = 0; z < desc.dims.z; z += step) {
+                const std::int64_t end = std::min(z + step, desc.dims.z);
+                read_region(bricks, 0, {{0, 0, z}, {desc.dims.x, desc.dims.y, end}},
+                            voxels.bytes().subspan(slice * std::uint64_t(z),
+                                                   slice * std::uint64_t(end - z)),
+                            BrickCache::global(), ev.stop());
+                ev.progress(0.5 * double(end) / double(desc.dims.z), "decoding bricks");
+            }
+            VolumeDesc plain = desc;
+            plain.has_mask = false;
+            out->volume = std::make_shared<DenseVolume>(plain, std::move(voxels));
+        }
+        bytes += out->volume->resident_bytes();
+        return out;
+    });
+    return held->volume;
+}
+
+struct Prepared {
+    VolumePtr volume;
+    std::shared_ptr<const gpu::FieldSource> field;
+    bool own_kernels = false;       // the field brings reconstruct() and gradient() itself
+    std::shared_ptr<const BlockRanges> blocks;
+    ValueRange range;               // of the tables; covers what reconstruction can give
+    TexturePtr occupancy;           // null: nothing to leap over
+    std::size_t seen = 0;           // blocks
+    // Per texel unit; see Gradients.
+    struct Stored {
+        TexturePtr texture;
+        float scale;
+    };
+    std::shared_ptr<const Stored> gradient;
+    TexturePtr classified, slabs, emission, emission_2d;
+};
+
+struct KeptTexture {
+    TexturePtr texture;
+};
+
+TexturePtr keep_table(const TransferPtr& transfer, const Hash& k, Evaluation& ev, GLenum target,
+                      glm::ivec2 dims, const std::function<std::vector<glm::vec4>()>& build) {
+    return Keep::instance().get<KeptTexture>(transfer, k, [&](std::uint64_t& bytes) {
+        const std::int64_t start = wall_ns();
+        std::vector<glm::vec4> table = build();
+        auto t = std::make_shared<gpu::Texture>(gpu::make_texture(
+            target, GL_RGBA32F, {dims, 1}, GL_LINEAR, "the table of the transfer function"));
+        gpu::upload(*t, {0, 0, 0}, {dims, 1}, GL_RGBA, GL_FLOAT, table.data());
+        bytes += t->bytes;
+        ev.count("table ms", double(wall_ns() - start) * 1e-6);
+        ev.count("bytes uploaded", double(t->bytes));
+        return std::make_shared<KeptTexture>(KeptTexture{t});
+    })->texture;
+}
+
+bool uses_gradient(const Scene& scene) {
+    const S& s = scene.settings;
+    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
+    return (s.shading && s.compositing != S::Compositing::x_ray && s.compositing != S::Compositing::mip) ||
+           (slabs && (s.modulation != glm::dvec2(0) || scene.transfer->two));
+}
+
+double smoothing_side(S::Gradient g) {
+    return g == S::Gradient::central ? 0.0 : g == S::Gradient::sobel ? 0.25 : 1.0 / 6.0;
+}
+
+// Which blocks can be seen, and how far to leap where they cannot.
+void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner, Prepared& p,
+                    Evaluation& ev) {
+    const S& s = scene.settings;
+    const TransferFunction& tf = *scene.transfer;
+    const bool iso = s.compositing == S::Compositing::isosurface;
+    struct Kept {
+        TexturePtr texture;
+        std::size_t seen = 0;
+    };
+    Hash what = iso ? key("iso", s.iso_value)
+                    : s.compositing == S::Compositing::mip ? key("valid") : hash_of(tf);
+    const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
+    auto kept = Keep::instance().get<Kept>(
+        owner, key("occupancy", what, key("", s.component, s.block_size, cubic)),
+        [&](std::uint64_t& bytes) {
+            auto out = std::make_shared<Kept>();
+            std::vector<std::uint8_t> seen(p.blocks->count());
+            for (std::size_t i = 0; i < seen.size(); ++i) {
+                const glm::dvec2 r(p.blocks->ranges[i]);
+                if (r.x > r.y) continue;  // no valid voxel
+                seen[i] = iso ? r.x <= s.iso_value && s.iso_value <= r.y
+                              : s.compositing == S::Compositing::mip || tf.max_extinction(r.x, r.y) > 0;
+                out->seen += seen[i];
+            }
+            if (out->seen == 0) return out;
+            std::vector<std::int8_t> distances = leaps(p.blocks->grid, seen);
+            auto t = std::make_shared<gpu::Texture>(gpu::make_texture(
+                GL_TEXTURE_3D, GL_R8I, p.blocks->grid, GL_NEAREST, "the blocks of the volume"));
+            gpu::upload(*t, {0, 0, 0}, p.blocks->grid, GL_RED_INTEGER, GL_BYTE, distances.data());
+            bytes += t->bytes + distances.size();
+            out->texture = t;
+            return out;
+        });
+    p.occupancy = kept->texture;
+    p.seen = kept->seen;
+    ev.count("blocks", double(p.blocks->count()));
+    ev.count("blocks drawn", double(p.seen));
+    ev.count("blocks skipped (transparent)", double(p.blocks->count() - p.seen));
+}
+
+Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<const void>& owner,
+                 Evaluation& ev) {
+    const S& s = scene.settings;
+    const TransferFunction& tf = *scene.transfer;
+    Keep& keep = Keep::instance();
+    Prepared p;
+    p.volume = dense(scene.source, owner, ev);
+    const Volume& volume = *p.volume;
+    const VolumeDesc& desc = volume.desc();
+    const glm::ivec3 dims(desc.dims);
+    const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
+
+    p.blocks = keep.get<BlockRanges>(
+        owner, key("ranges", s.component, s.block_size, cubic), [&](std::uint64_t& bytes) {
+            ev.progress(0.5, "looking for empty blocks");
+            auto b = std::make_shared<BlockRanges>(
+                block_ranges(volume, s.component, s.block_size, cubic ? 1 : 0, ev.stop()));
+            bytes += b->count() * sizeof(glm::vec2);
+            return b;
+        });
+    find_occupancy(scene, owner, p, ev);
+    if (p.seen == 0) return p;
+
+    constexpr double inf = std::numeric_limits<double>::infinity();
+    p.range = {inf, -inf};
+    for (glm::dvec2 r : p.blocks->ranges)
+        if (r.x <= r.y) p.range = {std::min(p.range.min, r.x), std::max(p.range.max, r.y)};
+
+    p.field = keep.get<gpu::FieldSource>(
+        owner, key("source", desc.color ? -1 : s.component), [&](std::uint64_t& bytes) {
+            ev.progress(0.55, "uploading the volume");
+            auto field = std::make_shared<gpu::FieldSource>();
+            if (auto given = gpu::provided_source(scene.source, {s.component, ev.stop()}))
+                *field = *given;
+            else
+                field->voxels = gpu::upload_dense(volume, s.component, ev.stop(), bytes);
+            ev.count("bytes uploaded", double(bytes));
+            return field;
+        });
+    const gpu::VoxelSource& voxels = p.field->voxels;
+    if (p.range.min == p.range.max) {
+        // A constant volume: a narrow range around its value, which then lies in the middle of the table.
+        double w = 1e-3 * (is_float(desc.type) && p.range.min != 0 ? std::abs(p.range.min) : voxels.scale);
+        p.range = {p.range.min - w, p.range.max + w};
+    }
+
+    if (uses_gradient(scene) && s.gradient_stored)
+        p.gradient = keep.get<Prepared::Stored>(
+            owner, key("gradient", s.gradient, desc.color ? -1 : s.component), [&](std::uint64_t& bytes) {
+                ev.progress(0.6, "computing gradients");
+                Gradients g(volume, s.component, voxels.offset, voxels.scale, smoothing_side(s.gradient));
+                float largest = g.largest(ev.stop());
+                float inverse = largest > 0 ? 1 / largest : 0;
+                auto t = gpu::upload_computed(
+                    dims, GL_RGBA16_SNORM, "the gradients of the volume",
+                    [&](int z, glm::vec4* out) {
+                        g.slice(z, out);
+                        for (std::int64_t i = 0; i < desc.dims.x * desc.dims.y; ++i) out[i] *= inverse;
+                    }, ev.stop());
+                bytes += t->bytes;
+                ev.count("bytes uploaded", double(t->bytes));
+                return std::make_shared<Prepared::Stored>(Prepared::Stored{t, largest});
+            });
+
+    const double d = view.plane_distance;
+    const Hash tables = key("", p.range.min, p.range.max, d);
+    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
+    if (slabs && tf.two) {
+        const glm::ivec2 size = tf.two->dims;
+        p.emission_2d = keep_table(scene.transfer, key("2d", tables, {}), ev, GL_TEXTURE_2D, size,
+                                   [&] { return emission_table_2d(*tf.two, d); });
+    } else if (slabs && s.classification == S::Classification::pre) {
+        p.classified = keep.get<KeptTexture>(
+            owner, key("classified", hash_of(tf), key("", d, s.component)), [&](std::uint64_t& bytes) {
+                ev.progress(0.7, "classifying the voxels");
+                auto t = gpu::upload_computed(
+                    dims, GL_RGBA32F, "the classified volume",
+                    [&](int z, glm::vec4* out) {
+                        classify_slice(volume, s.component, tf.one, d, z, out);
+                    }, ev.stop());
+                bytes += t->bytes;
+                ev.count("bytes uploaded", double(t->bytes));
+                return std::make_shared<KeptTexture>(KeptTexture{t});
+            })->texture;
+    } else if (slabs && s.classification == S::Classification::pre_integrated) {
+        p.slabs = keep_table(scene.transfer, key("slabs", tables, key("", s.table_size)), ev,
+                             GL_TEXTURE_2D, glm::ivec2(s.table_size), [&] {
+                                 return preintegrated_table(tf.one, p.range, s.table_size, d, ev.stop());
+                             });
+    } else if (s.compositing != S::Compositing::isosurface) {
+        const double thickness = slabs ? d : tf.reference_length;
+        p.emission = keep_table(scene.transfer, key("emission", tables, key("", thickness)), ev,
+                                GL_TEXTURE_1D, {kEmissionBins, 1}, [&] {
+                                    return emission_table(tf.one, p.range, kEmissionBins, thickness);
+                                });
+    }
+    return p;
+}
+
+// --- the shader --------------------------------------------------------------------------------
+
+Module module(std::string_view name) {
+    for (const Module& m : modules())
+        if (m.name == name) return m;
+    fail("shader module '{}' is not built in", name);
+}
+
+// The same functions over another texture: fetch_voxel becomes PREFIX_fetch_voxel.
+Module over(const Module& m, const std::string& prefix) {
+    Module out{m.name + " (" + prefix + ")", m.text};
+    for (std::string_view name : {"fetch_voxel", "sample_linear", "reconstruct", "dense_"})
+        for (std::size_t at = 0; (at = out.text.find(name, at)) != std::string::npos;) {
+            out.text.insert(at, prefix + "_");
+            at += prefix.size() + 1 + name.size();
+        }
+    return out;
+}
+
+gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
+    const S& s = scene.settings;
+    const gpu::VoxelSource& voxels = p.field->voxels;
+    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
+    const bool gradient = uses_gradient(scene);
+    const bool shading = s.shading && (s.compositing == S::Compositing::over ||
+                                       s.compositing == S::Compositing::isosurface);
+    const bool modulation = slabs && s.modulation != glm::dvec2(0);
+
+    std::string choices;
+    auto choose = [&](bool on, std::string_view name) {
+        if (on) choices += fmt::format("#define {}\n", name);
+    };
+    const std::size_t lights = scene.lights ? scene.lights->lights.size() : Lights{}.lights.size();
+    choose(voxels.color, "COLOR");
+    choose(voxels.has_validity, "VALIDITY");
+    choose(gpu::context_info().software, "EXACT_FILTER");
+    choose(s.ray_length, "RAY_LENGTH");
+    choose(s.skipping && p.occupancy, "SKIPPING");
+    choose(shading, "SHADING");
+    choose(modulation, "MODULATION");
+    choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", std::max<std::size_t>(lights, 1),
+                           smoothing_side(s.gradient));
+
+    const char* kernels[] = {"reconstruction-nearest", "reconstruction-trilinear",
+                             "reconstruction-tricubic"};
+    const Module kernel = module(kernels[int(s.reconstruction)]);
+    std::vector<Module> parts = {{"choices", choices}, module("ray"), voxels.glsl};
+    if (!voxels.linear) parts.push_back(module("linear-from-voxels"));
+    parts.push_back(kernel);
+    parts.push_back(module("scalar"));
+    auto second_texture = [&](const std::string& prefix) {
+        parts.push_back(over(gpu::dense_module(), prefix));
+        parts.push_back(over(kernel, prefix));
+    };
+    if (gradient) {
+        if (p.gradient) {
+            second_texture("gradient");
+            parts.push_back(module("gradient-stored"));
+        } else {
+            parts.push_back(module(s.gradient == S::Gradient::central ? "gradient-central"
+                                                                      : "gradient-smoothed"));
+        }
+        parts.push_back(module("gradient-world"));
+    }
+    if (shading) parts.push_back(module("shading"));
+    if (modulation) parts.push_back(module("modulation"));
+
+    if (!slabs) {
+        parts.push_back(module("classification-value"));
+        parts.push_back(module(s.compositing == S::Compositing::mip ? "march-mip" : "march-isosurface"));
+    } else {
+        if (p.emission_2d) {
+            parts.push_back(module("classification-2d"));
+        } else if (p.classified) {
+            second_texture("classified");
+            parts.push_back(module("classification-pre"));
+        } else {
+            parts.push_back(module(p.slabs ? "classification-pre-integrated" : "classification-post"));
+        }
+        parts.push_back(module(s.compositing == S::Compositing::over ? "compositing-over"
+                                                                     : "compositing-x-ray"));
+        parts.push_back(module(shading || modulation ? "march-slabs-late" : "march-slabs"));
+    }
+    parts.push_back(module("view-aligned"));
+    return gpu::program({module("proxy-screen")}, parts);
+}
+
+void set_lights(const gpu::Program& program, const Lights& lights, const Camera& camera,
+                const View& view) {
+    for (std::size_t i = 0; i < lights.lights.size(); ++i) {
+        const Light& l = lights.lights[i];
+        glm::dvec4 place(-camera.forward(), 0.0);
+        if (l.kind == Light::Kind::directional) place = {glm::normalize(l.position), 0.0};
+        if (l.kind == Light::Kind::point)
+            place = {(l.position - view.middle_world) / view.diagonal, 1.0};
+        program.set(fmt::format("light_place[{}]", i).c_str(), glm::vec4(place));
+        program.set(fmt::format("light_color[{}]", i).c_str(), glm::vec3(l.color));
+    }
+    if (lights.lights.empty()) program.set("light_color[0]", glm::vec3(0.0f));
+    program.set("material", glm::vec4(lights.ambient, lights.diffuse, lights.specular, lights.shininess));
+}
+
+void set_uniforms(const gpu::Program& program, const Scene& scene, const View& view, const Prepared& p) {
+    const S& s = scene.settings;
+    const gpu::VoxelSource& voxels = p.field->voxels;
+    const VolumeDesc& desc = p.volume->desc();
+    view.set(program);
+
+    int unit = 0;
+    for (const gpu::SourceTexture& t : voxels.textures) program.bind(t.sampler.c_str(), unit++, *t.texture);
+    const glm::vec3 inverse = 1.0f / glm::vec3(desc.dims);
+    const glm::ivec3 last(desc.dims - Index3(1));
+    for (const char* prefix : {"", "gradient_", "classified_"}) {
+        program.set((std::string(prefix) + "dense_inverse_dims").c_str(), inverse);
+        program.set((std::string(prefix) + "dense_last").c_str(), last);
+    }
+    if (p.gradient) {
+        program.bind("gradient_dense_texture", unit++, *p.gradient->texture);
+        program.set("gradient_scale", p.gradient->scale);
+    }
+    if (p.classified) program.bind("classified_dense_texture", unit++, *p.classified);
+    if (p.slabs) {
+        program.bind("slab_table", unit++, *p.slabs);
+        const double n = s.table_size;
+        program.set("slab_map", glm::vec2((n - 1) / n, 0.5 / n));
+    }
+    if (p.emission) {
+        program.bind("emission_table", unit++, *p.emission);
+        program.set("emission_bins", float(kEmissionBins));
+    }
+    const double extent = p.range.extent();
+    program.set("table_map", glm::vec2(voxels.scale / extent, (voxels.offset - p.range.min) / extent));
+    // A gradient in values per world length, from one in texel units per smallest spacing.
+    const double to_physical = voxels.scale / view.smallest_spacing;
+    if (p.emission_2d) {
+        program.bind("emission_table_2d", unit++, *p.emission_2d);
+        const TransferFunction2D& two = *scene.transfer->two;
+        auto map = [](ValueRange r, int n, double offset, double scale) {
+            double per_value = r.extent() > 0 ? (n - 1) / r.extent() : 0;
+            return glm::dvec2(scale * per_value, (offset - r.min) * per_value + 0.5) / double(n);
+        };
+        program.set("emission_map_2d",
+                    glm::vec4(glm::vec2(map(two.value, two.dims.x, p.range.min, extent)),
+                              glm::vec2(map(two.gradient, two.dims.y, 0, to_physical))));
+    }
+    const glm::dvec2 modulation = s.modulation / to_physical;
+    program.set("modulation_range",
+                glm::vec2(modulation.x, 1 / std::max(modulation.y - modulation.x, 1e-30)));
+    program.set("flat_gradient", 1e-7f);
+    if (s.skipping && p.occupancy) {
+        program.bind("occupancy", unit++, *p.occupancy);
+        program.set("block_size", float(p.blocks->size));
+        program.set("block_last", p.blocks->grid - 1);
+    }
+    program.set("saturated", float(1 - s.early_termination));
+    program.set("iso_level", float((s.iso_value - p.range.min) / extent));
+    program.set("iso_color", glm::vec3(color_of(scene.transfer->one.at(s.iso_value))));
+    program.set("background", glm::vec4(glm::dvec3(s.background) * s.background.a, s.background.a));
+    set_lights(program, scene.lights ? *scene.lights : Lights{}, *scene.camera, view);
+}
+
+// --- drawing -----------------------------------------------------------------------------------
+
+struct Target {
+    explicit Target(glm::ivec2 pixels)
+        : size(pixels),
+          color(gpu::make_texture(GL_TEXTURE_2D, GL_RGBA32F, {pixels, 1}, GL_NEAREST, "the picture")),
+          samples(gpu::make_texture(GL_TEXTURE_2D, GL_R32F, {pixels, 1}, GL_NEAREST, "the picture")),
+          framebuffer(gpu::make_framebuffer()), vertices(gpu::make_vertex_array()) {
+        glNamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
+        glNamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT1, samples.name(), 0);
+        const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+        glNamedFramebufferDrawBuffers(framebuffer.name(), 2, buffers);
+    }
+    glm::ivec2 size;
+    gpu::Texture color, samples;
+    gpu::Object framebuffer, vertices;
+};
+
+// Draws all rows, in batches that end often enough for a cancellation to be prompt.
+void draw(const gpu::Program& program, const Target& target, glm::ivec2 full_size, Evaluation& ev) {
+    constexpr double kBatchSeconds = 0.03;
+    program.set("pixel_scale", glm::vec2(full_size) / glm::vec2(target.size));
+    glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+    glBindVertexArray(target.vertices.name());
+    glUseProgram(program.name());
+    glViewport(0, 0, target.size.x, target.size.y);
+    glDisable(GL_BLEND);
+    glDisable(GL_DEPTH_TEST);
+    glEnable(GL_SCISSOR_TEST);
+    int rows = std::max(64, target.size.y / 8);
+    for (int y = 0; y < target.size.y;) {
+        check_stop(ev.stop());
+        const int n = std::min(rows, target.size.y - y);
+        const std::int64_t start = wall_ns();
+        glScissor(0, y, target.size.x, n);
+        glDrawArrays(GL_TRIANGLES, 0, 3);
+        glFinish();
+        const double seconds = double(wall_ns() - start) * 1e-9;
+        ev.add_draw_seconds(seconds);
+        y += n;
+        // Whole tiles of the software rasteriser; never more than four times the last batch, since
+        // the next rows may be dearer.
+        double next = double(n) * std::min(kBatchSeconds / std::max(seconds, 1e-6), 4.0);
+        rows = std::max(int(next) / 64 * 64, std::min(64, target.size.y));
+        ev.progress(0.8 + 0.2 * double(y) / double(target.size.y), "drawing");
+    }
+    glDisable(GL_SCISSOR_TEST);
+    gpu::check_errors("drawing");
+}
+
+std::shared_ptr<Image> read_back(const Target& target) {
+    auto image = std::make_shared<Image>(target.size, Image::Format::rgba32f);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.name());
+    glReadBuffer(GL_COLOR_ATTACHMENT0);
+    glReadPixels(0, 0, target.size.x, target.size.y, GL_RGBA, GL_FLOAT, image->bytes().data());
+    return image;
+}
+
+void count_samples(const Target& target, Evaluation& ev) {
+    std::vector<float> samples(std::size_t(target.size.x) * std::size_t(target.size.y));
+    glReadBuffer(GL_COLOR_ATTACHMENT1);
+    glReadPixels(0, 0, target.size.x, target.size.y, GL_RED, GL_FLOAT, samples.data());
+    double sum = 0, rays = 0, ended = 0;
+    for (float s : samples) {
+        sum += std::abs(s);
+        rays += s != 0;
+        ended += s < 0;
+    }
+    ev.count("samples", sum);
+    ev.count("rays", rays);
+    ev.count("rays ended by opacity", ended);
+}
+
+// Every pixel of the coarse picture as a square of the full one.
+ImagePtr enlarged(const Image& coarse, glm::ivec2 size) {
+    auto out = std::make_shared<Image>(size, Image::Format::rgba32f);
+    auto from = coarse.rgba32f();
+    auto to = out->rgba32f();
+    for (int y = 0; y < size.y; ++y)
+        for (int x = 0; x < size.x; ++x)
+            to[std::size_t(y) * std::size_t(size.x) + std::size_t(x)] =
+                from[std::size_t(y * coarse.size().y / size.y) * std::size_t(coarse.size().x) +
+                     std::size_t(x * coarse.size().x / size.x)];
+    return out;
+}
+
+ImagePtr only_background(const S& s) {
+    auto image = std::make_shared<Image>(s.size, Image::Format::rgba32f);
+    const glm::vec4 c(glm::dvec3(s.background) * s.background.a, s.background.a);
+    std::ranges::fill(image->rgba32f(), c);
+    return image;
+}
+
+}  // namespace
+
+ImagePtr render(const Scene& scene, Evaluation& ev) {
+    gpu::require_context();
+    const S& s = scene.settings;
+    const VolumeDesc desc = std::holds_alternative<VolumePtr>(scene.source)
+                                ? std::get<VolumePtr>(scene.source)->desc()
+                                : std::get<BricksPtr>(scene.source)->desc().volume;
+    std::shared_ptr<const void> owner;
+    if (auto* v = std::get_if<VolumePtr>(&scene.source))
+        owner = *v;
+    else
+        owner = std::get<BricksPtr>(scene.source);
+    if (desc.voxels() == 0) return only_background(s);
+    if (s.component >= desc.components)
+        fail("component {} is asked for, but the volume has {}", s.component, desc.components);
+
+    View view(*scene.camera, desc, s.size, s.slice_distance);
+    if (view.planes > kMostPlanes) {
+        const double coarser = s.slice_distance * view.planes / kMostPlanes;
+        ev.warn(fmt::format("slice_distance {} would need {:.0f} slices along this view; drawn with {} "
+                            "instead", s.slice_distance, view.planes, coarser));
+        view = View(*scene.camera, desc, s.size, coarser);
+    }
+    ev.count("slices", std::ceil(view.planes));
+
+    Prepared prepared = prepare(scene, view, owner, ev);
+    if (prepared.seen == 0) {
+        Keep::instance().shrink(s.gpu_bytes);
+        return only_background(s);
+    }
+    gpu::ProgramPtr program = assemble(scene, prepared);
+    set_uniforms(*program, scene, view, prepared);
+
+    if (ev.wants_provisional() && s.size.x * s.size.y > 128 * 128) {
+        Target coarse(glm::max(s.size / 4, glm::ivec2(1)));
+        draw(*program, coarse, s.size, ev);
+        ev.provisional("image", enlarged(*read_back(coarse), s.size));
+    }
+    Target target(s.size);
+    draw(*program, target, s.size, ev);
+    std::shared_ptr<Image> image = read_back(target);
+    count_samples(target, ev);
+    Keep::instance().shrink(s.gpu_bytes);
+    return image;
+}
+
+}  // namespace voxloom::slicer

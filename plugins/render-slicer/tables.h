@@ -1,0 +1,32 @@
+// Look-up tables of a transfer function: optical depth and colour times optical depth.
+//
+// An entry is (x c, x): x the optical depth of one slab of thickness d, c its mean colour as seen
+// from the front. Opacity 1 - exp(-x s) for a slab s times as thick, colour c times that: exact for
+// the opacity whatever s, and for the colour where it is constant.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <stop_token>
+#include <vector>
+
+#include "core/base/hash.h"
+#include "core/data/transfer_function.h"
+
+namespace voxloom::slicer {
+
+// Pre-integrated: entry (f, b) at [b * n + f] is the slab along which the value goes linearly from
+// that of node f to that of node b; nodes are evenly spaced from range.min to range.max, n >= 2.
+// O(n^2) with self-attenuation by sub-range windows (methods: Lum, Wilson and Ma 2004, with van
+// Herk's blocks so that no inverse is taken). The extinction of every unit segment is its exact mean,
+// so that a peak narrower than a bin keeps its integral.
+std::vector<glm::vec4> preintegrated_table(const TransferFunction1D& tf, ValueRange range, int n,
+                                           double d, const std::stop_token& stop = {});
+
+// One entry a node, n >= 2: the transfer function at the value.
+std::vector<glm::vec4> emission_table(const TransferFunction1D& tf, ValueRange range, int n, double d);
+// The nodes of a 2-D transfer function as they are, value fastest.
+std::vector<glm::vec4> emission_table_2d(const TransferFunction2D& tf, double d);
+
+Hash hash_of(const TransferFunction& tf);
+
+}  // namespace voxloom::slicer

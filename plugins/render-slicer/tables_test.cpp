@@ -1,0 +1,109 @@
+#include "plugins/render-slicer/tables.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+using namespace voxloom;
+using namespace voxloom::slicer;
+
+namespace {
+
+TransferFunction1D tent(double lo, double peak, double hi, double tau, glm::dvec3 left, glm::dvec3 right) {
+    return {{{lo, Emission(0)}, {peak, Emission(0.5 * (left + right) * tau, tau)}, {hi, Emission(0)}}};
+}
+
+// The slab by brute force: `steps` pieces, each with the emission of its middle.
+glm::dvec4 quadrature(const TransferFunction1D& tf, double f, double b, double d, int steps) {
+    glm::dvec3 light(0);
+    double depth = 0;
+    for (int i = 0; i < steps; ++i) {
+        Emission e = tf.at(f + (b - f) * (i + 0.5) / steps) * (d / steps);
+        double alpha = -std::expm1(-e.a);
+        if (e.a > 0) light += std::exp(-depth) * (alpha / e.a) * glm::dvec3(e);
+        depth += e.a;
+    }
+    return {light, -std::expm1(-depth)};
+}
+
+glm::dvec4 seen(glm::vec4 entry) {
+    double x = entry.a, alpha = -std::expm1(-x);
+    return x > 0 ? glm::dvec4(glm::dvec3(entry) * (alpha / x), alpha) : glm::dvec4(0);
+}
+
+}  // namespace
+
+TEST(PreintegratedTable, AgreesWithQuadratureInBothDirections) {
+    TransferFunction1D tf{{{0, Emission(0)},
+                           {0.3, Emission(8, 0, 0, 8)},
+                           {0.5, Emission(0, 0.5, 0, 0.5)},
+                           {0.8, Emission(0, 0, 6, 6)},
+                           {1, Emission(0)}}};
+    const int n = 257;
+    for (double d : {0.1, 1.0, 8.0}) {
+        std::vector<glm::vec4> table = preintegrated_table(tf, {0, 1}, n, d);
+        double worst_alpha = 0, worst_color = 0;
+        for (int f = 0; f < n; f += 16)
+            for (int b = 0; b < n; b += 16) {
+                if (f == b) continue;
+                glm::dvec4 got = seen(table[std::size_t(b * n + f)]);
+                glm::dvec4 want = quadrature(tf, f / 256.0, b / 256.0, d, 4096);
+                worst_alpha = std::max(worst_alpha, std::abs(got.a - want.a));
+                for (int c = 0; c < 3; ++c) worst_color = std::max(worst_color, std::abs(got[c] - want[c]));
+            }
+        EXPECT_LT(worst_alpha, 2e-5) << "d = " << d;
+        EXPECT_LT(worst_color, 5e-3) << "d = " << d;
+    }
+}
+
+TEST(PreintegratedTable, TwoHalvesCompositeToTheWhole) {
+    TransferFunction1D tf = tent(0.2, 0.5, 0.9, 5, {1, 0, 0}, {0, 0, 1});
+    const int n = 129;
+    std::vector<glm::vec4> whole = preintegrated_table(tf, {0, 1}, n, 2);
+    std::vector<glm::vec4> half = preintegrated_table(tf, {0, 1}, n, 1);
+    for (int f = 0; f < n; f += 8)
+        for (int b = 0; b < n; b += 8) {
+            if (f == b) continue;
+            int m = (f + b) / 2;
+            if (m == f || m == b) continue;
+            glm::dvec4 front = seen(half[std::size_t(m * n + f)]), back = seen(half[std::size_t(b * n + m)]);
+            glm::dvec4 got = front + (1 - front.a) * back, want = seen(whole[std::size_t(b * n + f)]);
+            EXPECT_NEAR(got.a, want.a, 2e-6);
+            for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[c], want[c], 2e-3);
+        }
+}
+
+TEST(PreintegratedTable, KeepsTheIntegralOfAPeakNarrowerThanABin) {
+    // A tent of area 0.01 * 50 / 2 inside one bin of a table with 16.
+    TransferFunction1D tf = tent(0.42, 0.425, 0.43, 50, {1, 1, 1}, {1, 1, 1});
+    const int n = 17;
+    std::vector<glm::vec4> table = preintegrated_table(tf, {0, 1}, n, 1);
+    EXPECT_NEAR(table[std::size_t(16 * n + 0)].a, 0.25, 1e-6);
+    EXPECT_NEAR(table[std::size_t(0 * n + 16)].a, 0.25, 1e-6);
+    // Crossing it in half of the range takes half of the slab per value, so twice the depth.
+    EXPECT_NEAR(table[std::size_t(8 * n + 0)].a, 0.5, 1e-6);
+    EXPECT_EQ(table[std::size_t(16 * n + 8)].a, 0.0f);
+}
+
+TEST(PreintegratedTable, OpaqueIsOpaqueAndWhatIsBehindItIsNotLost) {
+    TransferFunction1D tf{{{0, Emission(0)},
+                           {0.2, Emission(0)},
+                           {0.2, Emission(glm::dvec4(1, 0, 0, 1) * kMaxExtinction)},
+                           {0.4, Emission(glm::dvec4(1, 0, 0, 1) * kMaxExtinction)},
+                           {0.4, Emission(0)},
+                           {0.6, Emission(0, 0, 1, 1)},
+                           {1, Emission(0, 0, 1, 1)}}};
+    const int n = 65;
+    std::vector<glm::vec4> table = preintegrated_table(tf, {0, 1}, n, 1);
+    for (const glm::vec4& e : table)
+        for (int c = 0; c < 4; ++c) ASSERT_TRUE(std::isfinite(e[c]));
+    glm::dvec4 through = seen(table[std::size_t(64 * n + 0)]);
+    EXPECT_EQ(through.a, 1.0);
+    EXPECT_NEAR(through.r, 1.0, 1e-6);
+    EXPECT_NEAR(table[std::size_t(64 * n + 48)].a, 1.0, 1e-6);  // only the blue plateau
+}
+
+TEST(PreintegratedTable, ZeroIsExactlyZero) {
+    TransferFunction1D tf{{{0, Emission(0)}}};
+    for (const glm::vec4& e : preintegrated_table(tf, {0, 1}, 64, 1)) EXPECT_EQ(e, glm::vec4(0));
+}

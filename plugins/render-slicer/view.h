@@ -1,0 +1,37 @@
+// A camera over a volume, as the few numbers that a shader needs: computed in double, relative to the
+// middle of the volume, in index coordinates and numbers of planes.
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "core/data/camera.h"
+#include "core/data/volume.h"
+#include "core/gpu/program.h"
+
+namespace voxloom::slicer {
+
+struct View {
+    View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 size, double slice_distance);
+
+    double plane_distance = 1;   // world length between planes
+    double planes = 0;           // that meet the volume
+    bool perspective = true;
+
+    // Ray of pixel (x, y), pixel centres at +1/2: point on plane 0, and step to the next plane.
+    glm::dvec3 point_0, point_x, point_y, step_0, step_x, step_y;
+    glm::dvec4 slope{0};
+    double near_plane = 0;       // in planes
+    SamplingBox box;             // index coordinates
+
+    // For shading: world axes, lengths in units of the volume's diagonal, from its middle.
+    glm::dmat3 index_to_place, gradient_to_world;
+    glm::dvec3 middle;           // index coordinates
+    glm::dvec4 eye_place;
+    double diagonal = 1;         // world
+    glm::dvec3 middle_world;
+    double smallest_spacing = 1; // gradient_to_world is per this length
+
+    void set(const gpu::Program& program) const;
+};
+
+}  // namespace voxloom::slicer
