@@ -11,10 +11,6 @@ namespace voxloom {
 
 namespace {
 
-// Adding and taking away 1.5 * 2^52 leaves the nearest integer, ties to even, for |v| < 2^51; unlike
-// nearbyint() it vectorises on every machine.
-constexpr double kRound = 0x1.8p52;
-
 template <class T>
 T narrowed(double v) {
     constexpr double lo = double(std::numeric_limits<T>::lowest());
@@ -24,7 +20,7 @@ T narrowed(double v) {
     } else {
         v = v == v ? v : 0.0;
         v = v < lo ? lo : v > hi ? hi : v;
-        return T((v + kRound) - kRound);
+        return T(round_half_to_even(v));
     }
 }
 

@@ -7,6 +7,10 @@
 
 namespace voxloom {
 
+// For |v| < 2^51. Adding and taking away 1.5 * 2^52 leaves the nearest integer, ties to even; unlike
+// nearbyint() it vectorises on every machine.
+inline double round_half_to_even(double v) { return (v + 0x1.8p52) - 0x1.8p52; }
+
 void to_double(ScalarType type, const std::byte* from, std::size_t count, double* to);
 // Integers: rounded half to even and clamped to the type's limits, NaN becomes 0. Floats: finite
 // values are clamped to the type's limits, NaN and infinities stay.

@@ -73,7 +73,7 @@ std::string summary(const ValueDesc& desc) {
         text += fmt::format(" of {} steps", (*s)->times.size());
     if (auto* b = std::get_if<BricksDesc>(&desc.detail))
         text += fmt::format(" of {} levels", b->levels.size());
-    if (const VolumeDesc* volume = desc.volume()) text += " " + summary(*volume);
+    if (const VolumeDesc* volume = desc.volume()) text.append(" ").append(summary(*volume));
     return text;
 }
 
