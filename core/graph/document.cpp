@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include "core/base/error.h"
@@ -36,8 +37,17 @@ fs::path Graph::folder() const {
 Document::Document() : Document(parse("voxloom: 1\nnodes: []\n")) {}
 
 Document Document::parse(std::string text, fs::path file) {
+    Document document{Parsed()};
+    document.text_ = std::move(text);
+    document.graph_.file = std::move(file);
+    document.read();
+    return document;
+}
+
+// From text_ to tree_ and graph_, which stay as they are when the text is refused.
+void Document::read() {
     std::vector<Problem> problems;
-    auto tree = std::make_shared<YamlNode>(parse_yaml(text, problems));
+    auto tree = std::make_shared<YamlNode>(parse_yaml(text_, problems));
     Graph graph;
     if (problems.empty()) graph = read_graph(*tree, problems);
     if (!problems.empty()) {
@@ -45,15 +55,12 @@ Document Document::parse(std::string text, fs::path file) {
             return std::pair(a.mark.line, a.mark.column) < std::pair(b.mark.line, b.mark.column);
         });
         std::vector<std::string> lines;
-        for (const Problem& problem : problems) lines.push_back(problem.text(file));
+        for (const Problem& problem : problems) lines.push_back(problem.text(graph_.file));
         throw Error(join(lines, "\n"));
     }
-    graph.file = std::move(file);
-    Document document{Parsed()};
-    document.text_ = std::move(text);
-    document.graph_ = std::move(graph);
-    document.tree_ = std::move(tree);
-    return document;
+    graph.file = std::move(graph_.file);
+    graph_ = std::move(graph);
+    tree_ = std::move(tree);
 }
 
 Document Document::load(const fs::path& file) {
@@ -73,8 +80,8 @@ Document Document::load(const fs::path& file) {
 
 void Document::save(const fs::path& file) {
     // Through a link, the file behind it is replaced, not the link.
-    std::error_code error;
-    fs::path target = fs::is_symlink(file, error) ? fs::canonical(file, error) : file;
+    std::error_code ignored, error;
+    fs::path target = fs::is_symlink(file, ignored) ? fs::canonical(file, error) : file;
     if (error) fail("{}: the link leads nowhere; remove it or save elsewhere", file.string());
     fs::path temporary = target;
     temporary += fmt::format(".{}.part", getpid());
@@ -93,6 +100,229 @@ void Document::save(const fs::path& file) {
         fail("{}: the graph cannot be written: {}", file.string(), reason);
     }
     graph_.file = file;
+}
+
+// --- edits -------------------------------------------------------------------------------------------
+//
+// Each edit changes a copy of the graph. The text is then patched where the two differ and read
+// again; only when it says what the copy says does it become the document.
+
+namespace {
+
+void require_name(const std::string& name, std::string_view what) {
+    if (!is_node_name(name))
+        fail("'{}' is no {}: take 1 to 100 lower-case letters, digits, '_' and '-'", name, what);
+}
+
+void require_place(const std::string& id, glm::dvec2 at) {
+    if (!std::isfinite(at.x) || !std::isfinite(at.y))
+        fail("node '{}' cannot be drawn at ({}, {})", id, at.x, at.y);
+}
+
+void require_text(const std::string& text, std::string_view what) {
+    if (find_invalid_utf8(text) != std::string::npos) fail("{} is not UTF-8", what);
+}
+
+void require_text(const ParamValue& value, std::string_view what) {
+    if (auto* text = std::get_if<std::string>(&value)) require_text(*text, what);
+    if (auto* texts = std::get_if<std::vector<std::string>>(&value))
+        for (const std::string& text : *texts) require_text(text, what);
+}
+
+template <class T, class Name>
+auto find_by(std::vector<T>& all, Name T::*name, const std::string& key) {
+    return std::find_if(all.begin(), all.end(), [&](const T& one) { return one.*name == key; });
+}
+
+}  // namespace
+
+GraphNode& Document::node_of(Graph& graph, const std::string& id) const {
+    auto found = find_by(graph.nodes, &GraphNode::id, id);
+    if (found != graph.nodes.end()) return *found;
+    std::vector<std::string> ids;
+    for (const GraphNode& node : graph.nodes) ids.push_back(node.id);
+    fail("there is no node '{}'{}", id, did_you_mean(id, ids));
+}
+
+void Document::apply(const Graph& wanted) {
+    if (same_content(graph_, wanted)) return;
+    for (bool surgical : {true, false}) {
+        Edit edit;
+        std::string text;
+        std::size_t at = 0;
+        for (TextPatch& patch : patches_between(text_, *tree_, graph_, wanted, surgical)) {
+            if (patch.position < at) break;  // overlapping patches; the comparison below notices
+            text.append(text_, at, patch.position - at).append(patch.inserted);
+            at = patch.position + patch.length;
+            edit.push_back({patch.position, text_.substr(patch.position, patch.length),
+                            std::move(patch.inserted)});
+        }
+        text.append(text_, at);
+        Document next{Parsed()};
+        next.text_ = std::move(text);
+        next.graph_.file = graph_.file;
+        try {
+            next.read();
+        } catch (const Error&) {
+            continue;
+        }
+        if (!same_content(next.graph_, wanted)) continue;
+        text_ = std::move(next.text_);
+        graph_ = std::move(next.graph_);
+        tree_ = std::move(next.tree_);
+        history_.resize(done_);
+        if (!step_open_) {
+            history_.emplace_back();
+            ++done_;
+            step_open_ = step_depth_ > 0;
+        }
+        history_.back().push_back(std::move(edit));
+        return;
+    }
+    fail("the change cannot be written into this text; write the node as 'key: value' lines first");
+}
+
+void Document::add_node(const std::string& id, const std::string& type, std::optional<glm::dvec2> at) {
+    require_name(id, "id for a node");
+    require_text(type, "the node type");
+    if (type.empty()) fail("node '{}' needs a type", id);
+    if (at) require_place(id, *at);
+    if (graph_.find(id)) fail("there is a node '{}' already; take another id", id);
+    Graph wanted = graph_;
+    GraphNode& node = wanted.nodes.emplace_back();
+    node.id = id;
+    node.type = type;
+    node.at = at;
+    apply(wanted);
+}
+
+void Document::remove_node(const std::string& id) {
+    Graph wanted = graph_;
+    node_of(wanted, id);
+    auto of_node = [&](const WireEnd& end) { return end.node == id; };
+    std::erase_if(wanted.nodes, [&](const GraphNode& node) { return node.id == id; });
+    std::erase_if(wanted.outputs, of_node);
+    for (GraphNode& node : wanted.nodes)
+        std::erase_if(node.inputs, [&](GraphInput& input) {
+            return std::erase_if(input.from, of_node) > 0 && input.from.empty();
+        });
+    apply(wanted);
+}
+
+void Document::rename_node(const std::string& id, const std::string& to) {
+    require_name(to, "id for a node");
+    if (id != to && graph_.find(to)) fail("there is a node '{}' already; take another id", to);
+    Graph wanted = graph_;
+    node_of(wanted, id).id = to;
+    auto follow = [&](std::vector<WireEnd>& ends) {
+        for (WireEnd& end : ends)
+            if (end.node == id) end.node = to;
+    };
+    follow(wanted.outputs);
+    for (GraphNode& node : wanted.nodes)
+        for (GraphInput& input : node.inputs) follow(input.from);
+    apply(wanted);
+}
+
+void Document::set_param(const std::string& id, const std::string& key, const ParamValue& value) {
+    require_name(key, "name of a parameter");
+    require_text(value, "the value of parameter '" + key + "'");
+    Graph wanted = graph_;
+    GraphNode& node = node_of(wanted, id);
+    auto found = find_by(node.params, &GraphParam::key, key);
+    GraphParam& param = found != node.params.end() ? *found : node.params.emplace_back();
+    param.key = key;
+    param.yaml = yaml_of(value);
+    apply(wanted);
+}
+
+void Document::reset_param(const std::string& id, const std::string& key) {
+    Graph wanted = graph_;
+    std::erase_if(node_of(wanted, id).params, [&](const GraphParam& param) { return param.key == key; });
+    apply(wanted);
+}
+
+void Document::connect(const std::string& from_node, const std::string& from_port,
+                       const std::string& to_node, const std::string& to_port, bool append) {
+    require_name(from_port, "name of a port");
+    require_name(to_port, "name of a port");
+    Graph wanted = graph_;
+    node_of(wanted, from_node);
+    GraphNode& node = node_of(wanted, to_node);
+    auto found = find_by(node.inputs, &GraphInput::port, to_port);
+    GraphInput& input = found != node.inputs.end() ? *found : node.inputs.emplace_back();
+    input.port = to_port;
+    if (!append) input.from.clear();
+    input.from.push_back({from_node, from_port, {}});
+    input.is_list = append && (input.is_list || input.from.size() > 1);
+    apply(wanted);
+}
+
+void Document::disconnect(const std::string& to_node, const std::string& to_port) {
+    Graph wanted = graph_;
+    std::erase_if(node_of(wanted, to_node).inputs,
+                  [&](const GraphInput& input) { return input.port == to_port; });
+    apply(wanted);
+}
+
+void Document::move_node(const std::string& id, glm::dvec2 at) {
+    require_place(id, at);
+    Graph wanted = graph_;
+    node_of(wanted, id).at = at;
+    apply(wanted);
+}
+
+void Document::set_outputs(const std::vector<std::pair<std::string, std::string>>& outputs) {
+    Graph wanted = graph_;
+    wanted.outputs.clear();
+    for (const auto& [node, port] : outputs) {
+        node_of(wanted, node);
+        if (!port.empty()) require_name(port, "name of a port");
+        wanted.outputs.push_back({node, port, {}});
+    }
+    apply(wanted);
+}
+
+// --- history -----------------------------------------------------------------------------------------
+
+void Document::undo() {
+    if (!can_undo()) return;
+    step_open_ = false;
+    const std::vector<Edit>& step = history_[--done_];
+    for (auto edit = step.rbegin(); edit != step.rend(); ++edit) {
+        std::string text;
+        std::size_t at = 0;        // in text_
+        std::ptrdiff_t shift = 0;  // by which the edit moved what stands behind
+        for (const Splice& splice : *edit) {
+            std::size_t position = splice.position + std::size_t(shift);
+            text.append(text_, at, position - at).append(splice.removed);
+            at = position + splice.inserted.size();
+            shift += std::ptrdiff_t(splice.inserted.size()) - std::ptrdiff_t(splice.removed.size());
+        }
+        text_ = text.append(text_, at);
+    }
+    read();
+}
+
+void Document::redo() {
+    if (!can_redo()) return;
+    step_open_ = false;
+    for (const Edit& edit : history_[done_++]) {
+        std::string text;
+        std::size_t at = 0;
+        for (const Splice& splice : edit) {
+            text.append(text_, at, splice.position - at).append(splice.inserted);
+            at = splice.position + splice.removed.size();
+        }
+        text_ = text.append(text_, at);
+    }
+    read();
+}
+
+Document::Step::Step(Document& document) : document_(document) { ++document_.step_depth_; }
+
+Document::Step::~Step() {
+    if (--document_.step_depth_ == 0) document_.step_open_ = false;
 }
 
 }  // namespace voxloom

@@ -69,6 +69,9 @@ struct Graph {
     std::filesystem::path folder() const;
 };
 
+// Whether both say the same, wherever it stands in their texts.
+bool same_content(const Graph& a, const Graph& b);
+
 // Converts what the text says to a value for the parameter, or gives the reason why not.
 std::optional<ParamValue> parse_param(const ParamSpec& spec, const GraphParam::Yaml& yaml,
                                       std::string& reason);
@@ -90,7 +93,8 @@ class Document {
     const Graph& graph() const { return graph_; }
 
     // Edits. Each throws Error, leaving the document as it was, when it does not apply (unknown
-    // node, id taken). Each is one step of undo; a Step scope makes one step of several.
+    // node, id taken). Each is one step of undo; a Step scope makes one step of several. What is so
+    // already (a parameter that has the value, a port that has no wire) is no step at all.
     void add_node(const std::string& id, const std::string& type,
                   std::optional<glm::dvec2> at = std::nullopt);
     void remove_node(const std::string& id);                       // with its wires and outputs
@@ -121,23 +125,26 @@ class Document {
     };
 
   private:
-    // Every edit is a list of splices of the text: undo puts the old text back, so it always can.
+    // An edit replaced these parts of the text, in rising order; positions are those before it.
     struct Splice {
         std::size_t position;
         std::string removed, inserted;
     };
-    using Change = std::vector<Splice>;
-
+    using Edit = std::vector<Splice>;
     struct Parsed {};
     explicit Document(Parsed) {}
+
+    void read();
+    void apply(const Graph& wanted);
+    GraphNode& node_of(Graph& graph, const std::string& id) const;
 
     std::string text_;
     Graph graph_;
     std::shared_ptr<const YamlNode> tree_;  // of text_; immutable, so copies of a document share it
-    std::vector<Change> history_;
+    std::vector<std::vector<Edit>> history_;  // undone steps stand behind done_
     std::size_t done_ = 0;
     int step_depth_ = 0;
-    bool step_open_ = false;
+    bool step_open_ = false;  // the last step of the history takes further edits
 };
 
 }  // namespace voxloom

@@ -26,11 +26,6 @@ std::string_view kind_name(const YamlNode& node) {
     return "";
 }
 
-bool is_node_name(std::string_view s) {
-    return !s.empty() && s.size() <= 100 &&
-           s.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string_view::npos;
-}
-
 class GraphReader {
   public:
     explicit GraphReader(std::vector<Problem>& problems) : problems_(problems) {}
@@ -334,6 +329,11 @@ std::optional<ParamValue> convert(const ParamSpec& spec, const Yaml& yaml, std::
 }
 
 }  // namespace
+
+bool is_node_name(std::string_view name) {
+    return !name.empty() && name.size() <= 100 &&
+           name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string_view::npos;
+}
 
 Graph read_graph(const YamlNode& root, std::vector<Problem>& problems) {
     return GraphReader(problems).read(root);

@@ -1,4 +1,4 @@
-// Between a YAML tree and a Graph: reading one from the other, and patching the text where two
+// Between a YAML text and a Graph: reading one from the other, and patching the text where two
 // graphs differ.
 #pragma once
 
@@ -11,10 +11,29 @@
 namespace voxloom {
 
 // What the tree says. Everything that is wrong with its structure is added to `problems`; the graph
-// then holds what could be understood.
+// then holds what could be understood. Where nothing is wrong, node i of the graph is item i of the
+// tree's list of nodes.
 Graph read_graph(const YamlNode& root, std::vector<Problem>& problems);
 
 // A value on its own ("[1, 2]", "0.5"), as on a command line; false where it is none.
 bool parse_yaml_value(const std::string& text, GraphParam::Yaml& yaml);
+
+// How a value is held in a graph and written in one line.
+GraphParam::Yaml yaml_of(const ParamValue& value);
+std::string to_text(const GraphParam::Yaml& yaml);
+
+bool is_node_name(std::string_view name);  // 1 to 100 lower-case letters, digits, '_' and '-'
+
+// Replaces `length` bytes from `position` on.
+struct TextPatch {
+    std::size_t position = 0, length = 0;
+    std::string inserted;
+};
+
+// Which patches turn the text of `from`, parsed to `root`, into one of `to`, in rising order. The
+// graphs may differ in what their nodes and outputs hold, or `to` lacks some nodes, or has more at
+// its end. `surgical` patches touch what changed alone; otherwise whole nodes are written anew.
+std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root, const Graph& from,
+                                       const Graph& to, bool surgical);
 
 }  // namespace voxloom

@@ -159,9 +159,10 @@ std::string yaml_text(const std::string& s) {
     for (char c : s)
         plain = plain && (std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-' ||
                           c == '.' || c == '/');
-    if (s == "true" || s == "false" || s == "yes" || s == "no" || s == "on" || s == "off" ||
-        s == "null" || s == "True" || s == "False" || s == "y" || s == "n")
-        plain = false;
+    std::string lower = s;
+    for (char& c : lower) c = char(std::tolower(static_cast<unsigned char>(c)));
+    for (std::string_view word : {"true", "false", "yes", "no", "on", "off", "null", "y", "n"})
+        plain = plain && lower != word;
     if (plain) return s;
     std::string quoted = "\"";
     for (char c : s) {
