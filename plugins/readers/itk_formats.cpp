@@ -32,11 +32,20 @@ VolumeFile open_dicom(const std::filesystem::path& path, const std::string&) { w
 
 #include <algorithm>
 #include <cmath>
+#include <cstdarg>
 
 #include "core/base/text.h"
 #include "itk_part.h"
 #include "loaded.h"
 #include "text_header.h"
+
+// ITK reads TIFF with a libtiff of its own, whose symbols are renamed and whose headers are not
+// installed. It talks to the terminal unless told not to.
+extern "C" {
+using ItkTiffHandler = void (*)(const char*, const char*, std::va_list);
+ItkTiffHandler itk_TIFFSetWarningHandler(ItkTiffHandler);
+ItkTiffHandler itk_TIFFSetErrorHandler(ItkTiffHandler);
+}
 
 namespace voxloom {
 
@@ -65,8 +74,8 @@ std::string sentence_of(const itk::ExceptionObject& e) {
 void with_itk(const fs::path& path, const std::function<void()>& f) {
     std::lock_guard lock(itk_mutex());
     itk::Object::SetGlobalWarningDisplay(false);
-    TIFFSetWarningHandler(nullptr);
-    TIFFSetErrorHandler(nullptr);
+    itk_TIFFSetWarningHandler(nullptr);
+    itk_TIFFSetErrorHandler(nullptr);
     try {
         f();
     } catch (const itk::ExceptionObject& e) {
@@ -168,17 +177,75 @@ itk::ImageIOBase::Pointer make_io(const std::string& format) {
     return itk::TIFFImageIO::New().GetPointer();
 }
 
+// The first thing that libtiff complained of since it was emptied. Guarded by itk_mutex().
+std::string& tiff_complaint() {
+    static std::string text;
+    return text;
+}
+
+void keep_tiff_complaint(const char*, const char* format, std::va_list arguments) {
+    char text[200];
+    std::vsnprintf(text, sizeof text, format, arguments);
+    if (tiff_complaint().empty()) tiff_complaint() = text;
+}
+
+// Walks through the pages: every one is there, and all of its strips or tiles lie inside the file.
+// ITK itself reads what it can of a file that is cut short, and says nothing.
+void check_tiff(const fs::path& path) {
+    TIFFSetWarningHandler(nullptr);
+    TIFFSetErrorHandler(keep_tiff_complaint);
+    tiff_complaint().clear();
+    const std::uint64_t size = fs::file_size(path);
+    std::unique_ptr<TIFF, void (*)(TIFF*)> tiff(TIFFOpen(path.c_str(), "r"), TIFFClose);
+    if (!tiff) fail("{} is not a TIFF file, or its header is cut short", path.string());
+    std::size_t page = 0;
+    do {
+        const std::uint32_t parts = TIFFIsTiled(tiff.get()) ? TIFFNumberOfTiles(tiff.get())
+                                                            : TIFFNumberOfStrips(tiff.get());
+        for (std::uint32_t i = 0; i < parts; ++i) {
+            const std::uint64_t at = TIFFGetStrileOffset(tiff.get(), i);
+            const std::uint64_t bytes = TIFFGetStrileByteCount(tiff.get(), i);
+            if (at > size || bytes > size - at)
+                fail("{} is cut short: voxels of page {} lie behind its end; copy it again from its "
+                     "source", path.string(), page);
+            if (!tiff_complaint().empty()) break;
+        }
+        ++page;
+    } while (tiff_complaint().empty() && TIFFReadDirectory(tiff.get()));
+    if (!tiff_complaint().empty())
+        fail("{} is cut short or damaged after {} pages: {}", path.string(), page, tiff_complaint());
+}
+
 itk::ImageIOBase::Pointer opened(const std::string& format, const fs::path& path) {
     itk::ImageIOBase::Pointer io = make_io(format);
+    if (format == "tiff") check_tiff(path);
     io->SetFileName(path.string());
     io->ReadImageInformation();
     return io;
 }
 
+// What of a file's length is known beforehand; while it is packed, only that it cannot be enough.
+void check_length(const Layout& layout) {
+    if (layout.least_bytes == 0) return;
+    StoredVoxels whole;
+    whole.pieces = {{layout.data, 0}};
+    whole.packed = layout.packed;
+    check_size(whole, layout.least_bytes);
+}
+
+// Unpacks the stream to its end, keeping nothing: niftilib fills what is missing with zeros.
+void check_unpacked_length(const Layout& layout, const std::stop_token& stop) {
+    if (!layout.packed || layout.least_bytes == 0) return;
+    StoredVoxels whole;
+    whole.pieces = {{layout.data, 0}};
+    whole.packed = true;
+    PackedSteps(whole, layout.least_bytes, 1, 1).skip_through(layout.least_bytes, stop);
+}
+
 // The whole of what ITK reads, shared by the steps while any of them lives.
 std::function<VolumePtr(std::int64_t)> served_by_itk(const VolumeDesc& desc, std::int64_t steps,
                                                      const std::string& format, const fs::path& path,
-                                                     const Samples& samples) {
+                                                     const Samples& samples, const Layout& layout) {
     struct Shared {
         std::mutex mutex;
         std::weak_ptr<LoadOnce> source;
@@ -191,6 +258,7 @@ std::function<VolumePtr(std::int64_t)> served_by_itk(const VolumeDesc& desc, std
             source = std::make_shared<LoadOnce>(
                 desc.dense_bytes() * std::uint64_t(steps), desc.name,
                 [=](std::span<std::byte> out, const std::stop_token& stop) {
+                    check_unpacked_length(layout, stop);
                     with_itk(path, [&] { read_all(*opened(format, path), out, path); });
                     check_stop(stop);
                     to_native(out, bytes_of(desc.type), samples, path);
@@ -282,35 +350,41 @@ VolumeFile open_itk_file(const fs::path& given, const std::string& format) {
         itk::ImageIOBase::Pointer io = opened(format, path);
         image = image_of(*io, path);
     });
-    if (format == "nrrd") layout = nrrd_layout(nrrd, path, image.desc.components);
+    if (image.outer.size() > 1)
+        fail("{}: it has {} axes; volumes have three, and series a fourth, time", path.string(),
+             image.outer.size() + 3);
+    const std::int64_t steps = image.outer.empty() ? 1 : image.outer[0];
+    const std::uint64_t bytes = checked_product(image.desc.dims, image.desc.voxel_bytes(), path.string());
+    if (steps > 10'000'000 || bytes > (std::uint64_t(1) << 62) / std::uint64_t(std::max<std::int64_t>(steps, 1)))
+        fail("{}: the header claims {} time steps of {}, more than fit in 63 bits", path.string(), steps,
+             human_bytes(double(bytes)));
+    if (format == "nrrd")
+        layout = nrrd_layout(nrrd, path, image.desc.components,
+                             bytes / bytes_of(image.desc.type) * std::uint64_t(steps),
+                             bytes_of(image.desc.type));
     // MetaImage has no word for colours: ITK calls any three channels RGB.
     if (format == "meta") image.desc.color = image.desc.color && bytes_of(image.desc.type) <= 2;
     if (format == "tiff" && image.desc.spacing() == glm::dvec3(1)) words.unit.clear();
 
-    if (image.outer.size() > 1)
-        fail("{}: it has {} axes; volumes have three, and series a fourth, time", path.string(),
-             image.outer.size() + 3);
     file.desc = image.desc;
     file.desc.unit = words.unit;
     if (!words.name.empty()) file.desc.name = words.name;
     file.warnings = image.warnings;
     file.files = layout.files;
-    file.desc.dense_bytes();  // refuses sizes that overflow
+    file.steps = steps;
     if (!image.outer.empty()) {
-        file.steps = image.outer[0];
         file.time_unit = words.time_unit;
         double spacing = image.outer_spacing;
         if (!std::isfinite(spacing) || spacing <= 0) spacing = 1;
         double first = std::isfinite(image.outer_origin) ? image.outer_origin : 0;
-        if (file.steps > 10'000'000)
-            fail("{}: the header claims {} time steps", path.string(), file.steps);
         for (std::int64_t t = 0; t < file.steps; ++t) file.times.push_back(first + double(t) * spacing);
     }
     if (layout.voxels) {
         layout.voxels->samples.wide = image.samples.wide;
         serve_stored(file, std::move(*layout.voxels));
     } else {
-        file.volume = served_by_itk(file.desc, file.steps, format, path, image.samples);
+        check_length(layout);
+        file.volume = served_by_itk(file.desc, file.steps, format, path, image.samples, layout);
     }
     return file;
 }

@@ -258,11 +258,7 @@ void PackedSteps::read(std::int64_t step, std::span<std::byte> out, const std::s
                 inflater_ = std::make_unique<Inflater>(*starts_[std::size_t(from)]);
             } else {
                 inflater_ = std::make_unique<Inflater>(stored_.pieces.front().offset);
-                std::byte header[4096];
-                for (std::uint64_t left = stored_.skip, n; left > 0; left -= n) {
-                    n = std::min<std::uint64_t>(left, sizeof header);
-                    advance({header, n}, stop);
-                }
+                skip(stored_.skip, stop);
             }
             next_ = from;
         }
@@ -281,6 +277,22 @@ void PackedSteps::read(std::int64_t step, std::span<std::byte> out, const std::s
         throw;
     }
     to_native(out, sample_bytes_, stored_.samples, stored_.pieces.front().file);
+}
+
+void PackedSteps::skip(std::uint64_t bytes, const std::stop_token& stop) {
+    std::vector<std::byte> place(std::min<std::uint64_t>(bytes, 1 << 20));
+    for (std::uint64_t left = bytes, n; left > 0; left -= n) {
+        n = std::min<std::uint64_t>(left, place.size());
+        advance({place.data(), n}, stop);
+    }
+}
+
+void PackedSteps::skip_through(std::uint64_t bytes, const std::stop_token& stop) {
+    std::lock_guard lock(mutex_);
+    inflater_ = std::make_unique<Inflater>(stored_.pieces.front().offset);
+    skip(bytes, stop);
+    finish(stop);
+    inflater_.reset();
 }
 
 // Unpacks until `out` is full, or the stream ends; gives the number of bytes unpacked.

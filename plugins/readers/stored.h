@@ -54,10 +54,13 @@ class PackedSteps {
     PackedSteps(StoredVoxels stored, std::uint64_t step_bytes, std::int64_t steps,
                 std::size_t sample_bytes);
     ~PackedSteps();
+    // Unpacks `bytes` bytes and the end of the stream, keeping nothing: it is whole, or an Error.
+    void skip_through(std::uint64_t bytes, const std::stop_token& stop);
     void read(std::int64_t step, std::span<std::byte> out, const std::stop_token& stop);
 
   private:
     struct Inflater;
+    void skip(std::uint64_t bytes, const std::stop_token& stop);
     std::size_t unpack(std::span<std::byte> out, const std::stop_token& stop);
     void advance(std::span<std::byte> out, const std::stop_token& stop);
     void finish(const std::stop_token& stop);

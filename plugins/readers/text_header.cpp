@@ -128,8 +128,6 @@ NrrdHeader parse_nrrd_header(std::string_view head, const fs::path& path) {
                 while (next_line(head, at, line))
                     if (!trim(line).empty()) header.data_files.emplace_back(trim(line));
             }
-            if (key == "spaceunits") key = "spaceunits";
-            if (key == "centerings") key = "centers";
             header.fields[key] = value;
         }
     }
@@ -144,7 +142,8 @@ NrrdHeader parse_nrrd_header(std::string_view head, const fs::path& path) {
     return header;
 }
 
-Layout nrrd_layout(const NrrdHeader& header, const fs::path& path, int components) {
+Layout nrrd_layout(const NrrdHeader& header, const fs::path& path, int components,
+                   std::uint64_t samples, std::size_t sample_bytes) {
     Layout layout;
     layout.files = {path};
     const std::string encoding = lower(get(header.fields, "encoding"));
@@ -185,7 +184,17 @@ Layout nrrd_layout(const NrrdHeader& header, const fs::path& path, int component
     if (components > 1)
         known = known && !kinds.empty() && kinds[0] != "domain" && kinds[0] != "space" &&
                 kinds[0] != "time";
-    if (!known || skip < 0) return layout;
+    if (!known || skip < 0) {
+        // Numbers as text take a digit and a blank, in hexadecimal two digits a byte.
+        const bool text = encoding == "ascii" || encoding == "text" || encoding == "txt";
+        if (stored.pieces.size() == 1 && samples > 0) {
+            layout.data = stored.pieces[0].file;
+            if (text) layout.least_bytes = stored.pieces[0].offset + 2 * samples - 1;
+            if (encoding == "hex")
+                layout.least_bytes = stored.pieces[0].offset + 2 * samples * sample_bytes;
+        }
+        return layout;
+    }
 
     if (stored.packed) stored.skip = std::uint64_t(skip);
     else
@@ -219,6 +228,26 @@ MetaHeader parse_meta_header(std::string_view head, const fs::path& path) {
                  : field == std::string_view("dimsize") ? "DimSize"
                                                         : "ElementType");
     header.end = at;
+
+    // MetaIO keeps extents in 32 bits, and talks to the terminal of what it does not like.
+    std::int64_t axes = 0, extent = 0;
+    if (!parse_integer(get(header.fields, "ndims"), axes) || axes < 1 || axes > 10)
+        fail("{}: NDims is {}, and must be a number from 1 to 10", path.string(),
+             get(header.fields, "ndims"));
+    const std::vector<std::string> extents = split_words(get(header.fields, "dimsize"));
+    bool right = std::int64_t(extents.size()) == axes;
+    for (const std::string& word : extents)
+        right = right && parse_integer(word, extent) && extent > 0 && extent <= INT32_MAX;
+    if (!right)
+        fail("{}: DimSize is '{}', and must be {} numbers from 1 to 2147483647", path.string(),
+             get(header.fields, "dimsize"), axes);
+    if (!get(header.fields, "elementtype").starts_with("MET_"))
+        fail("{}: ElementType is '{}', and must be one of MetaImage's, such as MET_SHORT",
+             path.string(), get(header.fields, "elementtype"));
+    if (std::string type = get(header.fields, "objecttype"); lower(type) != "image")
+        fail("{}: it holds a MetaIO object of type '{}', not an Image", path.string(), type);
+    if (get(header.fields, "elementdatafile").empty())
+        fail("{}: the MetaImage header is cut short: ElementDataFile names no file", path.string());
     return header;
 }
 
@@ -287,6 +316,13 @@ Layout nifti_layout(std::string_view head, const fs::path& path, bool packed) {
                         : "its header does not begin with its length, 348");
         }
     }
+    const auto axes = field(40, std::int16_t{});
+    if (axes < 1 || axes > 7)
+        fail("{}: the NIfTI header has {} axes, and must have 1 to 7; it is damaged", path.string(), axes);
+    for (std::size_t a = 1; a <= std::size_t(axes); ++a)
+        if (field(40 + 2 * a, std::int16_t{}) < 1)
+            fail("{}: the NIfTI header has {} voxels along axis {}; it is damaged", path.string(),
+                 field(40 + 2 * a, std::int16_t{}), a);
     const std::string_view magic = head.substr(344, 3);
     const bool pair = magic == "ni1";
 
@@ -327,8 +363,14 @@ Layout nifti_layout(std::string_view head, const fs::path& path, bool packed) {
             stored.skip = packed ? std::uint64_t(offset) : 0;
             stored.samples.swap = swap;
             layout.voxels = std::move(stored);
+            return layout;
         }
     }
+    double bytes = std::abs(double(field(72, std::int16_t{}))) / 8;
+    for (std::size_t a = 1; a <= std::size_t(axes); ++a) bytes *= field(40 + 2 * a, std::int16_t{});
+    layout.data = data;
+    layout.packed = packed;
+    layout.least_bytes = std::uint64_t(std::min(bytes + std::max(double(offset), double(least)), 1e18));
     return layout;
 }
 

@@ -44,9 +44,15 @@ MetaHeader parse_meta_header(std::string_view head, const std::filesystem::path&
 struct Layout {
     std::optional<StoredVoxels> voxels;
     std::vector<std::filesystem::path> files;  // header and data
+    // Without `voxels`: what the data file must have at least, unpacked. The libraries do not all
+    // notice where it has less. 0: not known.
+    std::filesystem::path data;
+    std::uint64_t least_bytes = 0;
+    bool packed = false;
 };
 
-Layout nrrd_layout(const NrrdHeader& header, const std::filesystem::path& path, int components);
+Layout nrrd_layout(const NrrdHeader& header, const std::filesystem::path& path, int components,
+                   std::uint64_t samples, std::size_t sample_bytes);
 Layout meta_layout(const MetaHeader& header, const std::filesystem::path& path);
 // `head` is the unpacked beginning of a .nii, .nii.gz, or .hdr file.
 Layout nifti_layout(std::string_view head, const std::filesystem::path& path, bool packed);
