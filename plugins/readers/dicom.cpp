@@ -1,23 +1,23 @@
 // DICOM: one file, or a folder with the slices of a series.
 //
-// All headers of a folder are scanned with GDCM for the few tags that place a slice. A series' slices
+// All headers of a folder are walked for the few values that place a slice (dicom_header.h). A series' slices
 // are put in order along their common normal by their position, never by name or number. The matrix's
 // third column is the step from slice to slice as it is, so a tilted gantry gives a sheared grid.
 // Voxels come through ITK's GDCMImageIO, which applies rescale slope and intercept.
 #if VOXLOOM_WITH_ITK
 
 #include <fmt/format.h>
-#include <gdcmScanner.h>
 #include <gdcmTrace.h>
 #include <itkGDCMImageIO.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <fstream>
 #include <map>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "dicom_header.h"
 #include "itk_part.h"
 #include "loaded.h"
 
@@ -27,63 +27,22 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const gdcm::Tag kSeriesUid(0x0020, 0x000e), kSeriesName(0x0008, 0x103e), kPosition(0x0020, 0x0032),
-    kOrientation(0x0020, 0x0037), kNumber(0x0020, 0x0013), kRows(0x0028, 0x0010),
-    kColumns(0x0028, 0x0011), kFrames(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030),
-    kThickness(0x0018, 0x0050), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103),
-    kSlope(0x0028, 0x1053), kIntercept(0x0028, 0x1052);
+using Header = DicomHeader;
 
 struct Slice {
     fs::path path;
-    std::map<gdcm::Tag, std::string> tags;
+    DicomHeader header;
     double along = 0;  // position on the normal
-
-    std::string text(const gdcm::Tag& tag) const {
-        auto it = tags.find(tag);
-        std::string value = it == tags.end() ? "" : it->second;
-        while (!value.empty() && (value.back() == ' ' || value.back() == '\0')) value.pop_back();
-        while (!value.empty() && value.front() == ' ') value.erase(0, 1);
-        return value;
-    }
-    // Numbers between backslashes; empty unless there are `count` of them.
-    std::vector<double> numbers(const gdcm::Tag& tag, std::size_t count) const {
-        std::vector<double> values;
-        std::string all = text(tag);
-        for (std::size_t at = 0; at <= all.size();) {
-            std::size_t end = std::min(all.find('\\', at), all.size());
-            std::string word = all.substr(at, end - at);
-            std::erase(word, ' ');
-            double v = 0;
-            if (!parse_number(word, v) || !std::isfinite(v)) return {};
-            values.push_back(v);
-            at = end + 1;
-        }
-        return values.size() == count ? values : std::vector<double>();
-    }
-    double number(const gdcm::Tag& tag, double otherwise) const {
-        auto v = numbers(tag, 1);
-        return v.empty() ? otherwise : v[0];
-    }
 };
 
 // Those of `files` that are DICOM images.
 std::vector<Slice> scan(const std::vector<fs::path>& files) {
-    gdcm::Scanner scanner;
-    const gdcm::Tag tags[] = {kSeriesUid, kSeriesName, kPosition, kOrientation, kNumber, kRows,
-                              kColumns, kFrames, kPixelSpacing, kThickness, kBitsStored, kSigned,
-                              kSlope, kIntercept};
-    for (const gdcm::Tag& tag : tags) scanner.AddTag(tag);
-    gdcm::Directory::FilenamesType names;
-    for (const fs::path& file : files) names.push_back(file.string());
-    if (!scanner.Scan(names)) return {};
     std::vector<Slice> slices;
-    for (const std::string& name : names) {
-        if (!scanner.IsKey(name.c_str())) continue;
-        Slice slice;
-        slice.path = name;
-        for (const auto& [tag, value] : scanner.GetMapping(name.c_str()))
-            slice.tags[tag] = value ? value : "";
-        if (!slice.text(kRows).empty()) slices.push_back(std::move(slice));
+    for (const fs::path& file : files) {
+        if (!is_dicom(file)) continue;
+        std::ifstream in(file, std::ios::binary);
+        Slice slice{file, parse_dicom_header(in, file)};
+        if (slice.header.has_pixels) slices.push_back(std::move(slice));
     }
     return slices;
 }
@@ -92,16 +51,16 @@ std::vector<Slice> scan(const std::vector<fs::path>& files) {
 std::vector<Slice> one_series(std::vector<Slice> slices, const fs::path& folder,
                               const std::string& asked) {
     std::map<std::string, std::vector<Slice>> series;
-    for (Slice& slice : slices) series[slice.text(kSeriesUid)].push_back(std::move(slice));
+    for (Slice& slice : slices) series[slice.header.text(Header::kSeriesUid)].push_back(std::move(slice));
     if (!asked.empty())
         if (auto it = series.find(asked); it != series.end()) return std::move(it->second);
     if (asked.empty() && series.size() == 1) return std::move(series.begin()->second);
     std::vector<std::string> list;
     for (const auto& [uid, members] : series)
         list.push_back(fmt::format("{} ({}{} slices)", uid,
-                                   members[0].text(kSeriesName).empty()
+                                   members[0].header.text(Header::kSeriesName).empty()
                                        ? ""
-                                       : "'" + members[0].text(kSeriesName) + "', ",
+                                       : "'" + members[0].header.text(Header::kSeriesName) + "', ",
                                    members.size()));
     if (asked.empty())
         fail("{} holds {} series; set 'series_uid' to one of them: {}", folder.string(),
@@ -111,11 +70,11 @@ std::vector<Slice> one_series(std::vector<Slice> slices, const fs::path& folder,
 
 // Bits that hold every value that `stored` bits can take after adding the intercept; 0: unknown.
 int significant_bits(const Slice& slice, ScalarType type) {
-    const auto stored = int(slice.number(kBitsStored, 0));
-    const double slope = slice.number(kSlope, 1), intercept = slice.number(kIntercept, 0);
+    const auto stored = int(slice.header.number(Header::kBitsStored, 0));
+    const double slope = slice.header.number(Header::kSlope, 1), intercept = slice.header.number(Header::kIntercept, 0);
     if (stored < 1 || stored > 32 || slope != 1 || intercept != std::floor(intercept) || is_float(type))
         return 0;
-    const bool is_signed = slice.number(kSigned, 0) != 0;
+    const bool is_signed = slice.header.number(Header::kSigned, 0) != 0;
     const double span = std::exp2(stored);
     const double lo = (is_signed ? -span / 2 : 0) + intercept, hi = lo + span - 1;
     int bits = lo < 0 ? 1 : 0;
@@ -133,29 +92,29 @@ itk::ImageIOBase::Pointer opened(const fs::path& path) {
 // Order along the normal, spacing and the matrix. Without positions: order of instance numbers.
 void place(std::vector<Slice>& slices, VolumeFile& file, const fs::path& folder) {
     const auto n = std::int64_t(slices.size());
-    auto orientation = slices[0].numbers(kOrientation, 6);
+    auto orientation = slices[0].header.numbers(Header::kOrientation, 6);
     bool placed = !orientation.empty();
     for (const Slice& slice : slices) {
-        placed = placed && !slice.numbers(kPosition, 3).empty();
-        auto other = slice.numbers(kOrientation, 6);
+        placed = placed && !slice.header.numbers(Header::kPosition, 3).empty();
+        auto other = slice.header.numbers(Header::kOrientation, 6);
         for (std::size_t i = 0; placed && i < 6; ++i)
             if (other.size() != 6 || std::abs(other[i] - orientation[i]) > 1e-3)
                 fail("{} is turned against {}; slices of one volume must be parallel, so take the "
                      "localizers out of the folder", slice.path.string(), slices[0].path.string());
     }
-    auto pixel = slices[0].numbers(kPixelSpacing, 2);
+    auto pixel = slices[0].header.numbers(Header::kPixelSpacing, 2);
     if (pixel.empty()) {
         file.warnings.push_back("no pixel spacing is given: it is taken as 1");
         pixel = {1, 1};
     } else {
         file.desc.unit = "mm";
     }
-    double thickness = slices[0].number(kThickness, 1);
+    double thickness = slices[0].header.number(Header::kThickness, 1);
     if (!(thickness > 0)) thickness = 1;
 
     if (!placed) {
         std::stable_sort(slices.begin(), slices.end(), [](const Slice& a, const Slice& b) {
-            return a.number(kNumber, 0) < b.number(kNumber, 0);
+            return a.header.number(Header::kNumber, 0) < b.header.number(Header::kNumber, 0);
         });
         if (n > 1)
             file.warnings.push_back("the slices do not say where they are: they are taken in the order "
@@ -168,7 +127,7 @@ void place(std::vector<Slice>& slices, VolumeFile& file, const fs::path& folder)
     const glm::dvec3 y(orientation[3], orientation[4], orientation[5]);
     const glm::dvec3 normal = glm::normalize(glm::cross(x, y));
     auto position = [](const Slice& slice) {
-        auto p = slice.numbers(kPosition, 3);
+        auto p = slice.header.numbers(Header::kPosition, 3);
         return glm::dvec3(p[0], p[1], p[2]);
     };
     for (Slice& slice : slices) slice.along = glm::dot(position(slice), normal);
@@ -214,13 +173,13 @@ VolumeFile open_folder(const fs::path& folder, std::vector<Slice> slices) {
     VolumeFile file;
     file.format = "DICOM series";
     for (const Slice& slice : slices) {
-        if (slice.number(kFrames, 1) > 1)
+        if (slice.header.number(Header::kFrames, 1) > 1)
             fail("{} holds {} frames itself; name that file instead of the folder",
-                 slice.path.string(), slice.text(kFrames));
-        if (slice.text(kRows) != slices[0].text(kRows) || slice.text(kColumns) != slices[0].text(kColumns))
+                 slice.path.string(), slice.header.text(Header::kFrames));
+        if (slice.header.text(Header::kRows) != slices[0].header.text(Header::kRows) || slice.header.text(Header::kColumns) != slices[0].header.text(Header::kColumns))
             fail("{} is {} x {}, {} is {} x {}; slices of one volume must be alike",
-                 slice.path.string(), slice.text(kColumns), slice.text(kRows),
-                 slices[0].path.string(), slices[0].text(kColumns), slices[0].text(kRows));
+                 slice.path.string(), slice.header.text(Header::kColumns), slice.header.text(Header::kRows),
+                 slices[0].path.string(), slices[0].header.text(Header::kColumns), slices[0].header.text(Header::kRows));
     }
     ItkImage first;
     with_itk(slices[0].path, [&] { first = image_of(*opened(slices[0].path), slices[0].path); });
@@ -232,11 +191,11 @@ VolumeFile open_folder(const fs::path& folder, std::vector<Slice> slices) {
     // a float holds them all.
     bool alike = true;
     for (const Slice& slice : slices)
-        for (const gdcm::Tag& tag : {kSlope, kIntercept, kBitsStored, kSigned})
-            alike = alike && slice.text(tag) == slices[0].text(tag);
+        for (Header::Tag tag : {Header::kSlope, Header::kIntercept, Header::kBitsStored, Header::kSigned})
+            alike = alike && slice.header.text(tag) == slices[0].header.text(tag);
     if (!alike) file.desc.type = ScalarType::f32;
     else file.desc.significant_bits = significant_bits(slices[0], file.desc.type);
-    const std::string name = slices[0].text(kSeriesName);
+    const std::string name = slices[0].header.text(Header::kSeriesName);
     file.desc.name = name.empty() ? folder.filename().string() : name;
 
     std::vector<fs::path> paths;
@@ -275,7 +234,7 @@ VolumeFile open_one(const fs::path& path, const Slice& slice) {
     file.desc = image.desc;
     file.desc.unit = "mm";
     file.desc.significant_bits = significant_bits(slice, file.desc.type);
-    if (!slice.text(kSeriesName).empty()) file.desc.name = slice.text(kSeriesName);
+    if (!slice.header.text(Header::kSeriesName).empty()) file.desc.name = slice.header.text(Header::kSeriesName);
     file.warnings = image.warnings;
     file.files = {path};
     file.volume = [desc = file.desc, path, samples = image.samples](std::int64_t) {
@@ -296,9 +255,8 @@ VolumeFile open_dicom(const fs::path& path, const std::string& series_uid) {
     gdcm::Trace::WarningOff();
     gdcm::Trace::ErrorOff();
     const bool folder = fs::is_directory(path);
-    std::vector<Slice> slices;
     const std::vector<fs::path> files = folder ? files_in(path) : std::vector<fs::path>{path};
-    with_itk(path, [&] { slices = scan(files); });
+    std::vector<Slice> slices = scan(files);
     if (slices.empty() && folder)
         fail("{} is a folder without images: none of its {} files is DICOM or TIFF", path.string(),
              files.size());

@@ -10,7 +10,7 @@ namespace voxloom {
 namespace {
 [[noreturn]] void without_itk(const std::filesystem::path& path) {
     fail("{} needs ITK, and this voxloom was built without ITK; install libinsighttoolkit5-dev and "
-         "build again", path.string());
+         "libtiff-dev and build again", path.string());
 }
 }  // namespace
 VolumeFile open_itk_file(const std::filesystem::path& path, const std::string&) { without_itk(path); }
