@@ -1,12 +1,11 @@
 #include "tests/support/run_node.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <cstdlib>
 #include <mutex>
 
 #include "core/base/text.h"
 #include "core/gpu/thread.h"
+#include "core/graph/document.h"
 #include "core/plugin/loader.h"
 
 namespace voxloom::testing {
@@ -31,41 +30,6 @@ double NodeRun::measured(std::string_view name) const {
 }
 
 namespace {
-
-double number_of(const YAML::Node& node, const std::string& key) {
-    double value;
-    if (!node.IsScalar() || !parse_number(node.Scalar(), value)) fail("{}: not a number", key);
-    return value;
-}
-
-std::vector<double> numbers_of(const YAML::Node& node, const std::string& key) {
-    if (!node.IsSequence()) fail("{}: not a list", key);
-    std::vector<double> numbers;
-    for (const YAML::Node& item : node) numbers.push_back(number_of(item, key));
-    return numbers;
-}
-
-ParamValue value_of(const ParamSpec& spec, const YAML::Node& node) {
-    switch (spec.kind) {
-        case ParamKind::boolean: return node.as<bool>();
-        case ParamKind::integer: {
-            std::int64_t whole;
-            if (node.IsScalar() && parse_integer(node.Scalar(), whole)) return whole;
-            return number_of(node, spec.key);
-        }
-        case ParamKind::real: return number_of(node, spec.key);
-        case ParamKind::vector:
-        case ParamKind::color:
-        case ParamKind::list: return numbers_of(node, spec.key);
-        case ParamKind::rows: {
-            Rows rows;
-            for (const YAML::Node& row : node) rows.push_back(numbers_of(row, spec.key));
-            return rows;
-        }
-        case ParamKind::texts: return node.as<std::vector<std::string>>();
-        default: return node.as<std::string>();
-    }
-}
 
 std::vector<std::string> keys_of(const NodeType& type) {
     std::vector<std::string> keys;
@@ -206,16 +170,17 @@ Params params_from_yaml(const NodeType& type, const std::string& yaml,
                         const std::filesystem::path& graph_folder) {
     Params params(type.params,
                   graph_folder.empty() ? std::filesystem::path(VOXLOOM_SOURCE_DIR) : graph_folder);
-    YAML::Node root = YAML::Load(yaml);
-    if (!root || root.IsNull()) return params;
-    for (const auto& entry : root) {
-        auto key = entry.first.as<std::string>();
-        const ParamSpec* spec = type.find_param(key);
-        if (!spec) fail("{}: unknown parameter '{}'{}", type.id, key, did_you_mean(key, keys_of(type)));
-        ParamValue value = value_of(*spec, entry.second);
-        if (std::string problem = problem_with(*spec, value); !problem.empty())
-            fail("{}: parameter '{}' {}", type.id, key, problem);
-        params.set(key, std::move(value));
+    if (yaml.empty()) return params;
+    const Document document =
+        Document::parse("voxloom: 1\nnodes:\n  - {id: node, type: " + type.id + ", set: " + yaml + "}\n");
+    for (const GraphParam& given : document.graph().nodes.front().params) {
+        const ParamSpec* spec = type.find_param(given.key);
+        if (!spec)
+            fail("{}: unknown parameter '{}'{}", type.id, given.key, did_you_mean(given.key, keys_of(type)));
+        std::string reason;
+        std::optional<ParamValue> value = parse_param(*spec, given.yaml, reason);
+        if (!value) fail("{}: parameter '{}' {}", type.id, given.key, reason);
+        params.set(given.key, std::move(*value));
     }
     return params;
 }

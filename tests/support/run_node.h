@@ -56,8 +56,8 @@ struct NodeRun {
     double measured(std::string_view name) const;  // throws Error when it was not measured
 };
 
-// The parameters of a node type, from a YAML mapping ("{size: [64, 64], shading: true}").
-// Throws Error for unknown keys and for what problem_with() refuses.
+// The parameters of a node type, from a YAML mapping in one line ("{size: [64, 64], shading: true}").
+// Throws Error for unknown keys and for what is no value of theirs.
 Params params_from_yaml(const NodeType& type, const std::string& yaml,
                         const std::filesystem::path& graph_folder = {});
 
