@@ -261,15 +261,16 @@ TEST(RegistrySweep, AStoppedNodeReturnsAtOnceAndLeavesNothingBehind) {
         testing::RunNodeOptions options;
         options.output_folder = folder.path();
         options.stop = stop.get_token();
+        bool finished = false;  // right where there was nothing to stop
         try {
             testing::run_node(*type, small_params(*type), inputs, options);
-            continue;  // there was nothing to stop
+            finished = true;
         } catch (const Cancelled&) {
         } catch (const Error& e) {
             EXPECT_NE(std::string(e.what()), "");  // refused before it began
         }
         EXPECT_LE(endless->voxels_read_, 64u << 20) << "it went on reading";
-        EXPECT_TRUE(fs::is_empty(folder.path()));
+        EXPECT_TRUE(finished || fs::is_empty(folder.path()));
     }
 }
 
