@@ -128,23 +128,29 @@ ValueRange value_range(const Volume& volume, const std::stop_token& stop) {
     constexpr double inf = std::numeric_limits<double>::infinity();
     ValueRange all{inf, -inf};
     std::mutex mutex;
-    parallel_for(0, desc.dims.z, slices_per_slab(desc), [&](std::int64_t lo, std::int64_t hi) {
-        Box slab{{0, 0, lo}, {desc.dims.x, desc.dims.y, hi}};
-        std::size_t count = slab.voxels() * std::size_t(desc.components);
-        Buffer copy;
-        const std::byte* data = volume.data();
-        if (data) {
-            data += std::uint64_t(desc.dims.x) * std::uint64_t(desc.dims.y) * std::uint64_t(lo) *
-                    desc.voxel_bytes();
-        } else {
-            copy = Buffer(slab.voxels() * desc.voxel_bytes(), "slab");
-            volume.read(slab, copy.bytes(), stop);
-            data = copy.data();
-        }
+    // One slab at a time in memory for each thread, however long the range that it was given.
+    const std::int64_t step = slices_per_slab(desc), slabs = (desc.dims.z + step - 1) / step;
+    parallel_for(0, slabs, 1, [&](std::int64_t first, std::int64_t last) {
         ValueRange mine{inf, -inf};
-        with_type(desc.type, [&](auto t) {
-            widen_range(reinterpret_cast<const decltype(t)*>(data), count, mine);
-        });
+        for (std::int64_t i = first; i < last; ++i) {
+            check_stop(stop);
+            const Box slab{{0, 0, i * step},
+                           {desc.dims.x, desc.dims.y, std::min((i + 1) * step, desc.dims.z)}};
+            Buffer copy;
+            const std::byte* data = volume.data();
+            if (data) {
+                data += std::uint64_t(desc.dims.x) * std::uint64_t(desc.dims.y) *
+                        std::uint64_t(slab.lo.z) * desc.voxel_bytes();
+            } else {
+                copy = Buffer(slab.voxels() * desc.voxel_bytes(), "slab");
+                volume.read(slab, copy.bytes(), stop);
+                data = copy.data();
+            }
+            with_type(desc.type, [&](auto t) {
+                widen_range(reinterpret_cast<const decltype(t)*>(data),
+                            slab.voxels() * std::size_t(desc.components), mine);
+            });
+        }
         std::lock_guard lock(mutex);
         all = {std::min(all.min, mine.min), std::max(all.max, mine.max)};
     }, stop);
