@@ -42,6 +42,7 @@ TransferFunction1D through_points(std::vector<ControlPoint> points, const Colori
                                   const Density& density) {
     std::stable_sort(points.begin(), points.end(),
                      [](const auto& a, const auto& b) { return a.value < b.value; });
+    if (points.empty()) return {{{0, Emission(0.0)}}};
     TransferFunction1D f;
     auto add = [&](double value, double tau, glm::dvec3 color) {
         f.points.push_back({value, Emission(tau * color, tau)});
@@ -63,6 +64,7 @@ TransferFunction1D through_points(std::vector<ControlPoint> points, const Colori
 }
 
 TransferFunction1D sum_of_peaks(std::span<const Peak> peaks) {
+    if (peaks.empty()) return {{{0, Emission(0.0)}}};
     std::vector<double> values;
     for (const Peak& peak : peaks)
         for (double offset : {-0.5, 0.0, 0.5}) values.push_back(peak.value + offset * peak.width);
@@ -81,7 +83,6 @@ TransferFunction1D sum_of_peaks(std::span<const Peak> peaks) {
         }
         f.points.push_back({value, sum});
     }
-    if (f.points.empty()) f.points.push_back({0, Emission(0.0)});
     return f;
 }
 

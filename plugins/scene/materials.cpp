@@ -11,7 +11,7 @@ namespace voxloom::scene {
 
 namespace {
 
-constexpr int kBins = 128;
+constexpr std::size_t kBins = 128;
 using Histogram = std::vector<double>;
 
 VolumePtr volume_of(const Value& data, const std::stop_token& stop) {
@@ -30,22 +30,28 @@ VolumePtr volume_of(const Value& data, const std::stop_token& stop) {
 
 Histogram histogram_of(const Volume& volume, ValueRange range, const std::stop_token& stop) {
     const VolumeDesc& desc = volume.desc();
-    const double scale = kBins / range.extent();
+    const double scale = double(kBins) / range.extent();
     Histogram all(kBins, 0.0);
     std::mutex mutex;
-    parallel_for(0, desc.dims.z, 4, [&](std::int64_t lo, std::int64_t hi) {
-        const Box slab{{0, 0, lo}, {desc.dims.x, desc.dims.y, hi}};
-        Buffer voxels(slab.voxels() * desc.voxel_bytes(), "slab");
-        volume.read(slab, voxels.bytes(), stop);
+    // One slab at a time in memory for each thread, however long the range that it was given.
+    constexpr std::int64_t kSlab = 4;
+    parallel_for(0, (desc.dims.z + kSlab - 1) / kSlab, 1, [&](std::int64_t first, std::int64_t last) {
         Histogram mine(kBins, 0.0);
-        with_type(desc.type, [&](auto t) {
-            for (auto value : voxels.as<decltype(t)>()) {
-                const double bin = (double(value) - range.min) * scale;
-                if (bin >= 0 && bin <= kBins) mine[std::size_t(std::min(bin, kBins - 1.0))] += 1;
-            }
-        });
+        for (std::int64_t i = first; i < last; ++i) {
+            check_stop(stop);
+            const Box slab{{0, 0, i * kSlab},
+                           {desc.dims.x, desc.dims.y, std::min((i + 1) * kSlab, desc.dims.z)}};
+            Buffer voxels(slab.voxels() * desc.voxel_bytes(), "slab");
+            volume.read(slab, voxels.bytes(), stop);
+            with_type(desc.type, [&](auto t) {
+                for (auto value : voxels.as<decltype(t)>()) {
+                    const double bin = (double(value) - range.min) * scale;
+                    if (bin >= 0 && bin <= kBins) mine[std::size_t(std::min(bin, kBins - 1.0))] += 1;
+                }
+            });
+        }
         std::lock_guard lock(mutex);
-        for (int i = 0; i < kBins; ++i) all[std::size_t(i)] += mine[std::size_t(i)];
+        for (std::size_t i = 0; i < kBins; ++i) all[i] += mine[i];
     }, stop);
     return all;
 }
@@ -86,7 +92,11 @@ std::vector<double> material_boundaries(const Value& data, ValueRange range, int
     std::size_t end = kBins;
     for (std::size_t k = std::size_t(count); k > 0; --k) {
         end = cut[k][end];
-        boundaries.push_back(range.min + double(end) / kBins * range.extent());
+        // Every cut in a gap between two materials is as good: the middle stays clear of their noise.
+        std::size_t lo = end, hi = end;
+        while (lo > 0 && histogram[lo - 1] == 0) --lo;
+        while (hi < kBins && histogram[hi] == 0) ++hi;
+        boundaries.push_back(range.min + double(lo + hi) / (2 * kBins) * range.extent());
     }
     std::ranges::reverse(boundaries);
     return boundaries;

@@ -89,6 +89,7 @@ TEST(Transfer, SurvivesDataWithoutRangeOrExtent) {
     for (double v : {0.0, -7.0, 1e30, std::nan("")})
         for (Index3 dims : {Index3(0), Index3(1), Index3(3)})
             for (const char* set : {"{}", "{preset: isosurfaces}", "{preset: ramp}",
+                                    "{preset: materials}",
                                     "{widgets: [[0, 1, 0, 1, 1, 1, 1, 0.5]]}"}) {
                 TransferFunction f = transfer(set, constant(v, dims));
                 for (const auto& p : f.one.points) {
@@ -217,6 +218,26 @@ TEST(Transfer, SpreadsIsosurfacesAndAddsUpWhereTheyOverlap) {
     EXPECT_DOUBLE_EQ(two.at(10).a, 1.5);
     EXPECT_DOUBLE_EQ(two.at(10.5).a, 1.5);
     EXPECT_DOUBLE_EQ(two.integral(0, 20).a, 4);
+}
+
+TEST(Transfer, FindsTheBoundariesOfMaterials) {
+    // Four materials: air fills most of the volume, the densest one a hundredth of it.
+    auto four = make_volume({100, 10, 10}, ScalarType::i16, [](auto x, auto y, auto z) {
+        double noise = double((x * 7 + y * 3 + z * 5) % 11);
+        return (x < 80 ? 0 : x < 90 ? 300 : x < 99 ? 600 : 1500) + noise;
+    });
+    NodeRun r = run("{preset: materials}", four);
+    auto within = [&](const char* name, double lo, double hi) {
+        EXPECT_GT(r.measured(name), lo) << name;
+        EXPECT_LT(r.measured(name), hi) << name;
+    };
+    within("boundary_1", 10, 300);
+    within("boundary_2", 310, 600);
+    within("boundary_3", 610, 1500);
+    const TransferFunction f = *r.output<TransferFunction>("transfer");
+    EXPECT_EQ(f.one.max_extinction(0, 10), 0);
+    EXPECT_GT(f.one.at(1500).a, f.one.at(600).a);
+    EXPECT_EQ(problems("{preset: materials}").size(), 1u);  // nothing to look at
 }
 
 TEST(Transfer, PlacesHounsfieldPresetsWhereTheyBelong) {
