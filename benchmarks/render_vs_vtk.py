@@ -55,7 +55,7 @@ TRANSFERS = {
     "isosurfaces": {"preset": "isosurfaces", "iso_count": 4, "iso_width": 0.1, "iso_opacity": 0.3},
     "smooth": {"preset": "ramp", "ramp_start": 0.15, "ramp_end": 1.0, "ramp_opacity": 0.1},
 }
-SLICER_STEPS = (0.5, 1, 2)
+SLICE_DISTANCES = (0.5, 1, 2)
 VTK_STEPS = (0.25, 0.5, 1, 2)
 COLUMNS = ("scene", "transfer", "shaded", "size", "renderer", "setting", "ms", "rmse", "psnr_db",
            "max_error", "speed_vs_vtk_gpu")
@@ -65,10 +65,10 @@ def slicer_views(shaded):
     """{node: (setting, parameters)}: what slicer.render is asked to draw."""
     views = {}
     for classification in ("pre-integrated", "post"):
-        for step in SLICER_STEPS:
+        for step in SLICE_DISTANCES:
             name = f"slicer_{classification.replace('-', '_')}_{str(step).replace('.', '_')}"
             views[name] = (f"{classification}, {step} voxels",
-                           {"classification": classification, "step": step})
+                           {"classification": classification, "slice_distance": step})
     return views
 
 
