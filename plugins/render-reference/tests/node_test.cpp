@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
+#include "core/data/dense_pyramid.h"
 #include "core/plugin/plugin.h"
 #include "plugins/render-reference/tests/scenes.h"
 #include "tests/support/run_node.h"
@@ -30,6 +31,10 @@ NodeInputs inputs(Value source) {
             {"camera", {look({30, 17, 22}, {5, 5, 5})}}};
 }
 
+std::vector<std::byte> bytes(const ImagePtr& image) {
+    return {image->bytes().begin(), image->bytes().end()};
+}
+
 TEST(ReferenceNode, DrawsAPictureOfTheSizeAskedFor) {
     const auto run = run_node(registry(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
     EXPECT_EQ(run.image()->size(), glm::ivec2(20, 10));
@@ -41,6 +46,14 @@ TEST(ReferenceNode, DrawsAPictureOfTheSizeAskedFor) {
     EXPECT_GT(brightest, 0.1f);
     EXPECT_FALSE(run.progress.empty());
     EXPECT_EQ(run.progress.back(), 1.0);
+}
+
+TEST(ReferenceNode, BricksShowWhatTheirVolumeShows) {
+    const VolumePtr volume = waves_volume();
+    const BricksPtr bricks = make_dense_pyramid(volume, glm::ivec3(4), PyramidFilter::average);
+    for (const char* params : {"{size: [16, 16]}", "{size: [16, 16], shading: true, mode: steps}"})
+        EXPECT_EQ(bytes(run_node(registry(), "reference.raycast", params, inputs(volume)).image()),
+                  bytes(run_node(registry(), "reference.raycast", params, inputs(bricks)).image()));
 }
 
 TEST(ReferenceNode, LightsReplaceTheHeadlight) {
