@@ -53,7 +53,8 @@ void widen_row(const T* row, const std::uint8_t* valid, const VolumeDesc& desc, 
 }  // namespace
 
 BlockRanges block_ranges(const Volume& volume, int component, int size, int reach,
-                         const std::stop_token& stop) {
+                         bool cubic, const std::stop_token& stop) {
+    if (cubic) ++reach;
     const VolumeDesc& desc = volume.desc();
     const std::byte* data = volume.data();
     BlockRanges out;
@@ -95,7 +96,7 @@ BlockRanges block_ranges(const Volume& volume, int component, int size, int reac
             }
         }, stop);
     });
-    if (reach > 0)
+    if (cubic)
         for (glm::vec2& r : out.ranges)
             if (r.x < r.y) {
                 float middle = 0.5f * (r.x + r.y), half = float(kCubicOvershoot) * 0.5f * (r.y - r.x);

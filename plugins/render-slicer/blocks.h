@@ -11,9 +11,9 @@
 
 namespace voxloom::slicer {
 
-// Smallest and largest value that reconstruction can meet in each block of `size` cells a side: its
-// voxels, the layer shared with the next block, and for cubic kernels (`reach` 1) one more layer and
-// their overshoot. lo > hi where no voxel is valid. Colours count by their luma.
+// Smallest and largest value that reconstruction can meet in each block of `size` cells a side and
+// within `reach` voxels of it: its voxels, the layer shared with the next block, and for cubic
+// kernels one more layer and their overshoot. lo > hi where no voxel is valid. Colours count by their luma.
 struct BlockRanges {
     int size = 8;
     glm::ivec3 grid{0};             // blocks; x fastest
@@ -21,7 +21,7 @@ struct BlockRanges {
     std::size_t count() const { return ranges.size(); }
 };
 BlockRanges block_ranges(const Volume& volume, int component, int size, int reach,
-                         const std::stop_token& stop);
+                         bool cubic, const std::stop_token& stop);
 
 // Catmull-Rom weights sum to 1 with absolute sum at most 1.25 an axis: how far a value may overshoot
 // half the range of its footprint, in three axes.

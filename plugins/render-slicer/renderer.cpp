@@ -80,8 +80,8 @@ VolumePtr dense(const Value& source, const std::shared_ptr<const void>& owner, E
 struct Prepared {
     VolumePtr volume;
     std::shared_ptr<const gpu::FieldSource> field;
-    bool own_kernels = false;       // the field brings reconstruct() and gradient() itself
     std::shared_ptr<const BlockRanges> blocks;
+    Hash blocks_key;
     ValueRange range;               // of the tables; covers what reconstruction can give
     TexturePtr occupancy;           // null: nothing to leap over
     std::size_t seen = 0;           // blocks
@@ -136,9 +136,8 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
     };
     Hash what = iso ? key("iso", s.iso_value)
                     : s.compositing == S::Compositing::mip ? key("valid") : hash_of(tf);
-    const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
     auto kept = Keep::instance().get<Kept>(
-        owner, key("occupancy", what, key("", s.component, s.block_size, cubic)),
+        owner, key("occupancy", what, p.blocks_key),
         [&](std::uint64_t& bytes) {
             auto out = std::make_shared<Kept>();
             std::vector<std::uint8_t> seen(p.blocks->count());
@@ -177,11 +176,12 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
     const glm::ivec3 dims(desc.dims);
     const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
 
+    p.blocks_key = key("ranges", s.component, s.block_size, cubic, view.square_reach());
     p.blocks = keep.get<BlockRanges>(
-        owner, key("ranges", s.component, s.block_size, cubic), [&](std::uint64_t& bytes) {
+        owner, p.blocks_key, [&](std::uint64_t& bytes) {
             ev.progress(0.5, "looking for empty blocks");
-            auto b = std::make_shared<BlockRanges>(
-                block_ranges(volume, s.component, s.block_size, cubic ? 1 : 0, ev.stop()));
+            auto b = std::make_shared<BlockRanges>(block_ranges(
+                volume, s.component, s.block_size, view.square_reach(), cubic, ev.stop()));
             bytes += b->count() * sizeof(glm::vec2);
             return b;
         });
@@ -444,9 +444,12 @@ struct Target {
 };
 
 // Draws all rows, in batches that end often enough for a cancellation to be prompt.
-void draw(const gpu::Program& program, const Target& target, glm::ivec2 full_size, Evaluation& ev) {
+void draw(const gpu::Program& program, const Target& target, const View& view, Evaluation& ev) {
     constexpr double kBatchSeconds = 0.03;
-    program.set("pixel_scale", glm::vec2(full_size) / glm::vec2(target.size));
+    const bool coarse = target.size != view.size;
+    program.set("pixel_scale", glm::vec2(view.size) / glm::vec2(target.size));
+    program.set("square", coarse ? 1.0f : float(view.square));
+    program.set("square_reach", coarse ? 0.0f : float(view.square_reach()));
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
     glBindVertexArray(target.vertices.name());
     glUseProgram(program.name());
@@ -554,11 +557,11 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
 
     if (ev.wants_provisional() && s.size.x * s.size.y > 128 * 128) {
         Target coarse(glm::max(s.size / 4, glm::ivec2(1)));
-        draw(*program, coarse, s.size, ev);
+        draw(*program, coarse, view, ev);
         ev.provisional("image", enlarged(*read_back(coarse), s.size));
     }
     Target target(s.size);
-    draw(*program, target, s.size, ev);
+    draw(*program, target, view, ev);
     std::shared_ptr<Image> image = read_back(target);
     count_samples(target, ev);
     Keep::instance().shrink(s.gpu_bytes);

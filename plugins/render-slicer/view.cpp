@@ -7,7 +7,8 @@
 
 namespace voxloom::slicer {
 
-View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 size, double slice_distance) {
+View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 pixels, double slice_distance)
+    : size(pixels) {
     const glm::dmat3 to_world(desc.index_to_world);
     const glm::dvec3 spacing = desc.spacing();
     smallest_spacing = std::min({spacing.x, spacing.y, spacing.z});
@@ -60,6 +61,20 @@ View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 size, double
     if (perspective)
         slope = {-0.5 * size.x * pixel, pixel, 0.5 * size.y * pixel, -pixel};
     near_plane = (std::max(camera.near, 0.0) - depth) / plane_distance;
+
+    for (int side : {4, 2}) {
+        constexpr int kMostReach = 3;  // wider blocks would be seen too often
+        double widest = 0;
+        for (double m : {-0.5 * planes, 0.5 * planes}) {
+            glm::dvec3 spread = glm::abs(point_x + m * step_x) + glm::abs(point_y + m * step_y);
+            widest = std::max({widest, spread.x, spread.y, spread.z});
+        }
+        const double reach = std::ceil(0.5 * side * widest + 0.01);
+        if (reach > kMostReach) continue;
+        square = side;
+        reach_ = int(reach);
+        break;
+    }
 
     index_to_place = to_world / diagonal;
     gradient_to_world = smallest_spacing * glm::transpose(to_index);

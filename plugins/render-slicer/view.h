@@ -22,6 +22,11 @@ struct View {
     glm::dvec4 slope{0};
     double near_plane = 0;       // in planes
     SamplingBox box;             // index coordinates
+    glm::ivec2 size;             // of the picture
+    // Pixels on the side of the squares that leap together, and how far, in voxels of any axis, their
+    // rays are from the one through the middle; whole numbers, as blocks are widened by them.
+    int square = 1;
+    int square_reach() const { return reach_; }
 
     // For shading: world axes, lengths in units of the volume's diagonal, from its middle.
     glm::dmat3 index_to_place, gradient_to_world;
@@ -32,6 +37,9 @@ struct View {
     double smallest_spacing = 1; // gradient_to_world is per this length
 
     void set(const gpu::Program& program) const;
+
+  private:
+    int reach_ = 0;
 };
 
 }  // namespace voxloom::slicer

@@ -3,10 +3,12 @@ uniform float iso_level;  // u
 uniform vec3 iso_color;
 float hit = -1e30;
 bool finished() { return hit > -1e30; }
-float march(float m, float end) {
+void march(float k, float end) {
+    float m = on_ray(k);
     Sample front = observe(ray_at(m));
-    while (m < end && !finished()) {
-        float next = min(floor(m) + 1.0, end);
+    while (k < end && !finished()) {
+        k += 1.0;
+        float next = on_ray(k);
         Sample back = observe(ray_at(next));
         bool crosses = (front.scalar.x < iso_level) != (back.scalar.x < iso_level) &&
                        front.scalar.y * back.scalar.y > 0.0;
@@ -17,18 +19,16 @@ float march(float m, float end) {
             m = next;
         }
     }
-    if (finished()) {
-        float lo = m, hi = hit;
-        for (int i = 0; i < 14; ++i) {
-            float mid = 0.5 * (lo + hi);
-            Sample s = observe(ray_at(mid));
-            bool before = (s.scalar.x < iso_level) == (front.scalar.x < iso_level);
-            lo = before ? mid : lo;
-            hi = before ? hi : mid;
-        }
-        hit = 0.5 * (lo + hi);
+    if (!finished()) return;
+    float lo = m, hi = hit;
+    for (int i = 0; i < 14; ++i) {
+        float mid = 0.5 * (lo + hi);
+        Sample s = observe(ray_at(mid));
+        bool before = (s.scalar.x < iso_level) == (front.scalar.x < iso_level);
+        lo = before ? mid : lo;
+        hi = before ? hi : mid;
     }
-    return end;
+    hit = 0.5 * (lo + hi);
 }
 vec4 picture() {
     if (!finished()) return vec4(0.0);

@@ -12,14 +12,13 @@ void look(Sample s) {
 #endif
     largest = s.scalar.y > 0.0 ? max(largest, s.scalar.x) : largest;
 }
-float march(float m, float end) {
-    look(observe(ray_at(m)));
-    while (m < end) {
-        m = min(floor(m) + 1.0, end);
-        look(observe(ray_at(m)));
+void march(float k, float end) {
+    look(observe(ray_at(on_ray(k))));
+    while (k < end) {
+        k += 1.0;
+        look(observe(ray_at(on_ray(k))));
         samples += 1.0;
     }
-    return m;
 }
 vec4 picture() {
     if (largest <= -1.0) return vec4(0.0);

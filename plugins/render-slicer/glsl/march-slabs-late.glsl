@@ -1,14 +1,16 @@
 // As march-slabs, where a seen slab is dear (it needs a gradient) and most are not seen: the inner
 // loop runs to the next slab that is, the outer one pays for it. On SIMD machines, where a branch
 // costs both of its sides, this is what makes the unseen ones cheap.
-float march(float m, float end) {
+void march(float k, float end) {
+    float m = on_ray(k);
     Sample front = observe(ray_at(m));
-    while (m < end && !finished()) {
+    while (k < end && !finished()) {
         vec4 e = vec4(0.0);
         float from = m;
-        while (m < end && e.a <= 0.0) {
+        while (k < end && e.a <= 0.0) {
+            k += 1.0;
             from = m;
-            m = min(floor(m) + 1.0, end);
+            m = on_ray(k);
             Sample back = observe(ray_at(m));
             e = slab(front, back);
             samples += 1.0;
@@ -24,5 +26,4 @@ float march(float m, float end) {
 #endif
         add_slab(e, (m - from) * slab_length);
     }
-    return m;
 }

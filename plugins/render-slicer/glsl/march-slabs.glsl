@@ -1,14 +1,14 @@
-// One ray over the slabs from m to end, whose front and back samples are known at the planes. Returns
-// where it stopped.
-float march(float m, float end) {
+// The slabs between planes k and end; front and back samples are known at the planes.
+void march(float k, float end) {
+    float m = on_ray(k);
     Sample front = observe(ray_at(m));
-    while (m < end && !finished()) {
-        float next = min(floor(m) + 1.0, end);
+    while (k < end && !finished()) {
+        k += 1.0;
+        float next = on_ray(k);
         Sample back = observe(ray_at(next));
         add_slab(slab(front, back), (next - m) * slab_length);
         samples += 1.0;
         front = back;
         m = next;
     }
-    return m;
 }

@@ -7,10 +7,13 @@ uniform vec4 slope;                      // world slope of the ray: x0 + x1 * x,
 uniform vec2 pixel_scale;                // a coarse picture asks for every n-th ray
 
 vec3 ray_point, ray_step;
+float ray_first, ray_last;               // m where it enters and leaves what is drawn
 float slab_length = 1.0;                 // length along the ray between two planes / their distance
 float samples = 0.0;
 
 vec3 ray_at(float m) { return ray_point + m * ray_step; }
+// Plane k, or the end of the ray where that comes first: slabs beyond have no thickness.
+float on_ray(float k) { return clamp(k, ray_first, ray_last); }
 void aim(vec2 pixel) {
     ray_point = point_0 + pixel.x * point_x + pixel.y * point_y;
     ray_step = step_0 + pixel.x * step_x + pixel.y * step_y;
