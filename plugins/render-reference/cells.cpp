@@ -17,7 +17,7 @@ constexpr int kPiecesBesideInvalid = 16;
 constexpr double kThinDepth = 0.5;
 constexpr int kMaxHalvings = 60;  // then the stretch is a rounding error long
 // Light is as steep as normals turn, without bound where the gradient vanishes.
-constexpr double kLightTolerance = 1e-9;
+constexpr double kLightTolerance = 1e-7;
 constexpr int kMaxLightHalvings = 12;
 
 template <class T>
@@ -267,17 +267,22 @@ void Raycaster::emit_piece(const Segment& segment, const Path& path, Cell& cell,
         const double x = from + (to - from) * y;
         return lit(emission(y), cell.gradient(x), path.at(cell.t + x * cell.length), path);
     };
-    auto stretch = [&](double a, double b) {
-        glm::dvec3 sum(0.0);
-        for (const Node& node : kGauss8) {
-            const double y = a + (b - a) * node.x;
-            sum += node.weight * std::exp(-depth(a, y)) * color(y);
-        }
-        return sum * (b - a) * length;
+    struct Seen {
+        glm::dvec3 fine{0.0}, coarse{0.0};
     };
-    // Halved until there is little optical depth in a stretch and, as light makes kinks, until
-    // halving changes nothing. Where even that does not help, the extinction is so great that the
-    // colour at the stretch's front is all that is seen.
+    auto stretch = [&](const auto& rule, double a, double b) {
+        Seen seen;
+        for (const Node& node : rule) {
+            const double y = a + (b - a) * node.x;
+            const glm::dvec3 here = (b - a) * length * std::exp(-depth(a, y)) * color(y);
+            seen.fine += node.weight * here;
+            seen.coarse += node.coarse * here;
+        }
+        return seen;
+    };
+    // Halved until there is little optical depth in a stretch and, as light makes kinks, until two
+    // rules agree. Where even that does not help, the extinction is so great that the colour at the
+    // stretch's front is all that is seen.
     auto integrate = [&](auto&& self, double a, double b, int halvings) -> void {
         if (out.saturated()) return;
         const double d = depth(a, b), middle = 0.5 * (a + b), through = std::exp(-out.depth);
@@ -287,16 +292,15 @@ void Raycaster::emit_piece(const Segment& segment, const Path& path, Cell& cell,
             return;
         }
         bool settled = d <= kThinDepth;
-        glm::dvec3 seen(0.0);
-        if (settled) seen = stretch(a, b);
-        if (settled && scene_.shading && halvings < kMaxLightHalvings) {
-            const glm::dvec3 halves = stretch(a, middle) +
-                                      std::exp(-depth(a, middle)) * stretch(middle, b);
-            settled = glm::length(halves - seen) * through <= kLightTolerance;
-            seen = halves;
+        Seen seen;
+        if (settled && !scene_.shading) seen = stretch(kGauss8, a, b);
+        if (settled && scene_.shading) {
+            seen = stretch(kKronrod15, a, b);
+            settled = halvings >= kMaxLightHalvings ||
+                      glm::length(seen.fine - seen.coarse) * through <= kLightTolerance;
         }
         if (settled) {
-            out.color += through * seen;
+            out.color += through * seen.fine;
             out.depth += d;
         } else {
             self(self, a, middle, halvings + 1);

@@ -67,7 +67,7 @@ TEST(Cubic, WithoutTurningPointsIsOneStretch) {
     }
 }
 
-TEST(Cubic, GaussRulesAreExactToTheirDegree) {
+TEST(Cubic, QuadratureIsExactToItsDegree) {
     auto power = [](const auto& rule, int n) {
         double sum = 0;
         for (const Node& node : rule) sum += node.weight * std::pow(node.x, n);
@@ -75,7 +75,14 @@ TEST(Cubic, GaussRulesAreExactToTheirDegree) {
     };
     for (int n = 0; n <= 3; ++n) EXPECT_NEAR(power(kGauss2, n), 1.0 / (n + 1), 1e-15);
     for (int n = 0; n <= 15; ++n) EXPECT_NEAR(power(kGauss8, n), 1.0 / (n + 1), 1e-15);
+    for (int n = 0; n <= 22; ++n) EXPECT_NEAR(power(kKronrod15, n), 1.0 / (n + 1), 1e-15);
     EXPECT_GT(std::abs(power(kGauss2, 4) - 1.0 / 5), 1e-3);
+
+    for (int n = 0; n <= 13; ++n) {
+        double coarse = 0;
+        for (const Node& node : kKronrod15) coarse += node.coarse * std::pow(node.x, n);
+        EXPECT_NEAR(coarse, 1.0 / (n + 1), 1e-15);
+    }
 }
 
 }  // namespace
