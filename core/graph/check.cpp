@@ -42,6 +42,11 @@ std::string suggestion(std::string_view wrong, const std::vector<std::string>& k
                        known.size() - most);
 }
 
+// "parameter 'x' must be ...", "parameter 'x': 'red' is not one of ..."
+std::string about_parameter(std::string_view key, std::string_view reason) {
+    return fmt::format("parameter '{}'{} {}", key, reason.starts_with('\'') ? ":" : "", reason);
+}
+
 // Suggestions among the ids of a whole graph or registry: the comparisons are limited, so that a
 // file with ten thousand wrong names does not take a hundred million of them.
 class LimitedSuggestions {
@@ -209,7 +214,7 @@ class Checker {
             node(i).params.set(spec->key, std::move(*value));
         else
             node_problem(i, param.yaml.mark, param.key,
-                         fmt::format("parameter '{}' {}", param.key, reason));
+                         about_parameter(param.key, reason));
     }
 
     // --- overrides of the command line ---------------------------------------------------------------
@@ -240,7 +245,7 @@ class Checker {
                                               suggestion(key, keys_of(type.params))));
         std::string reason;
         auto value = parse_override(*spec, text.substr(equals + 1), reason);
-        if (!value) return refuse(i, key, fmt::format("parameter '{}' {}", key, reason));
+        if (!value) return refuse(i, key, about_parameter(key, reason));
         if (auto* path = std::get_if<std::string>(&*value);
             spec->kind == ParamKind::path_in && path && !path->empty())
             *path = fs::absolute(options_.overrides_base / *path).lexically_normal().string();

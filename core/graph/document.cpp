@@ -16,8 +16,8 @@ namespace voxloom {
 namespace fs = std::filesystem;
 
 std::string Problem::text(const fs::path& file) const {
-    std::string place = file.empty() ? "graph" : file.string();
-    if (mark.line > 0) place += fmt::format(":{}:{}", mark.line, mark.column);
+    if (mark.line == 0) return message;  // not from the text, but from the command line
+    std::string place = fmt::format("{}:{}:{}", file.empty() ? "graph" : file.string(), mark.line, mark.column);
     return node.empty() ? fmt::format("{}: {}", place, message)
                         : fmt::format("{}: node '{}': {}", place, node, message);
 }

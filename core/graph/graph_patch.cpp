@@ -316,8 +316,12 @@ class Patcher {
 
     void insert_in_flow(const YamlNode& collection, std::size_t end, const std::string& entry) {
         bool fits = line_end(end) - line_start(end) + entry.size() + 2 <= kColumns;
+        if (fits) return patch(end, 0, ", " + entry);
+        // Below the first entry, unless that stands far out.
         const YamlNode& first = collection.kind == Kind::map ? collection.keys[0] : collection.items[0];
-        patch(end, 0, fits ? ", " + entry : "," + newline_ + indent(column(first.begin)) + entry);
+        std::size_t margin = column(first.begin);
+        if (margin > kColumns / 2) margin = skip_spaces(line_start(end)) - line_start(end) + 4;
+        patch(end, 0, "," + newline_ + indent(margin) + entry);
     }
 
     void remove_entries(const YamlNode& map, const std::vector<int>& removed) {
@@ -361,12 +365,14 @@ class Patcher {
     }
 
     // On another line than what stays, the comma before it stays, too: a comment may stand between.
+    // Then one behind it must go.
     void remove_flow_tail(std::size_t kept_end, std::size_t begin, std::size_t end) {
-        bool alone = begins_line(begin) && skip_spaces(end) == line_end(end);
-        if (line_end(kept_end) >= begin)
+        if (line_end(kept_end) >= begin) {
             begin = kept_end;
-        else if (alone)
-            begin = end_of_line_before(begin);
+        } else {
+            if (std::size_t comma = skip_blank(text_, end); text_[comma] == ',') patch(comma, 1, "");
+            if (begins_line(begin) && skip_spaces(end) == line_end(end)) begin = end_of_line_before(begin);
+        }
         patch(begin, end - begin, "");
     }
 

@@ -491,7 +491,9 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
     };
 
     for (const char* original : {kGraph, "voxloom: 1\nnodes: []",
-                                 "{ voxloom: 1, # c\r\n nodes: [\r\n { id: a, type: t }, # x\r\n { id: b, type: t } ] }"}) {
+                                 "{ voxloom: 1, # c\r\n nodes: [\r\n { id: a, type: t }, # x\r\n { id: b, type: t } ] }",
+                                 "nodes:\n    # first\n-   type: t\n    in: {}\n    set:\n       p0: [1,\n 2]  # two\n"
+                                 "       p1:\n       - 1\n       -\n         - 2\n    id: a\n#last\nvoxloom: 1\n"}) {
         Document document = Document::parse(original);
         Model model = model_of(document.graph());
         std::vector<Model> done, undone;
@@ -502,7 +504,7 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
             return (state >> 33) % n;
         };
         auto any_node = [&] { return std::next(model.nodes.begin(), std::ptrdiff_t(random(model.nodes.size())))->first; };
-        for (int i = 0; i < 3400; ++i) {
+        for (int i = 0; i < 2500; ++i) {
             std::uint64_t what = random(12);
             if (what == 0 && document.can_undo()) {
                 document.undo();
@@ -523,10 +525,9 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 ASSERT_TRUE(model_of(document.graph()) == model);
                 continue;
             }
-            SCOPED_TRACE(document.text());
             Model before = model;
             std::string text_before = document.text();
-            if (model.nodes.size() < 2 || (what == 2 && model.nodes.size() < 12)) {
+            if (model.nodes.size() < 2 || (what == 2 && model.nodes.size() < 5)) {
                 std::string id = "n" + std::to_string(random(100000));
                 if (model.nodes.count(id)) continue;
                 document.add_node(id, "fake.add", random(2) ? std::optional(glm::dvec2(1, 2)) : std::nullopt);
@@ -556,7 +557,7 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                     for (auto& [port, ends] : n.inputs)
                         for (std::string& end : ends) follow(end);
             } else if (what <= 6) {
-                std::string id = any_node(), key = "p" + std::to_string(random(6));
+                std::string id = any_node(), key = "p" + std::to_string(random(3));
                 ParamValue value;
                 switch (random(6)) {
                     case 0: value = double(random(1000)) / 7; break;
@@ -569,18 +570,18 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 document.set_param(id, key, value);
                 model.nodes[id].params[key] = to_yaml(value);
             } else if (what == 7) {
-                std::string id = any_node(), key = "p" + std::to_string(random(6));
+                std::string id = any_node(), key = "p" + std::to_string(random(3));
                 document.reset_param(id, key);
                 model.nodes[id].params.erase(key);
             } else if (what <= 9) {
-                std::string from = any_node(), to = any_node(), port = "i" + std::to_string(random(3));
+                std::string from = any_node(), to = any_node(), port = "i" + std::to_string(random(2));
                 bool append = random(2);
                 document.connect(from, "out", to, port, append);
                 auto& ends = model.nodes[to].inputs[port];
                 if (!append) ends.clear();
                 ends.push_back(from + ".out");
             } else if (what == 10) {
-                std::string id = any_node(), port = "i" + std::to_string(random(3));
+                std::string id = any_node(), port = "i" + std::to_string(random(2));
                 document.disconnect(id, port);
                 model.nodes[id].inputs.erase(port);
             } else if (random(2)) {
@@ -612,7 +613,7 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
         }
         EXPECT_EQ(document.text(), original);
         while (document.can_redo()) document.redo();
-        EXPECT_TRUE(model_of(document.graph()) == model);
+        EXPECT_TRUE(model_of(document.graph()) == (undone.empty() ? model : undone.front()));
     }
 }
 
