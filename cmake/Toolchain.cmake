@@ -41,3 +41,7 @@ if(VOXLOOM_SANITIZE)
                            -Wno-stringop-overflow -Wno-array-bounds)
   endif()
 endif()
+if(VOXLOOM_FUZZ)
+  # Coverage of everything, for libFuzzer to steer by; the targets themselves link its main().
+  target_compile_options(voxloom-options INTERFACE -fsanitize=fuzzer-no-link)
+endif()
