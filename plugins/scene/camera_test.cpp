@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/data/dense_pyramid.h"
 #include "plugins/scene/framing.h"
 #include "plugins/scene/nodes.h"
 #include "tests/support/run_node.h"
@@ -135,6 +136,28 @@ TEST(Camera, IsFiniteForEverySizeAndScale) {
                                     "{distance: 0}", "{elevation: 90}", "{elevation: -90}"})
                 EXPECT_TRUE(finite(camera(set, box_volume(dims, glm::dvec3(scale)))))
                     << dims.x << " " << dims.y << " " << dims.z << " scale " << scale << " " << set;
+}
+
+TEST(Camera, FitsAnythingThatKnowsItsPlace) {
+    VolumePtr v = box_volume({9, 30, 4});
+    NodeType node = camera_node();
+    auto eye = [&](Value fit) {
+        return run_node(node, params_from_yaml(node, "{}"), {{"fit", {fit}}}).output<Camera>("camera")->eye;
+    };
+    class OneStep final : public Series {
+      public:
+        using Series::Series;
+        Value fetch(std::size_t, const std::stop_token&) const override { fail("fetched"); }
+    };
+    SeriesDesc series;
+    series.times = {0};
+    series.step = ValueDesc(v->desc());
+    LatticeDesc lattice;
+    lattice.grids = {{ValueDesc(v->desc()), {}, 0}};
+    EXPECT_EQ(eye(make_dense_pyramid(v, glm::ivec3(8), PyramidFilter::average)), eye(v));
+    EXPECT_EQ(eye(SeriesPtr(std::make_shared<OneStep>(series))), eye(v));
+    EXPECT_EQ(eye(LatticePtr(std::make_shared<Lattice>(lattice, std::vector<Value>{v}))), eye(v));
+    EXPECT_THROW(eye(LatticePtr(std::make_shared<Lattice>(LatticeDesc{}, std::vector<Value>{}))), Error);
 }
 
 TEST(Camera, KeepsItsDirectionInsideTheVolume) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/text.h"
+#include "core/data/dense_pyramid.h"
 #include "plugins/scene/classification.h"
 #include "plugins/scene/nodes.h"
 #include "plugins/scene/presets.h"
@@ -102,6 +103,20 @@ TEST(Transfer, SurvivesDataWithoutRangeOrExtent) {
             }
 }
 
+TEST(Transfer, TakesRangeAndBoundariesOfBricks) {
+    auto volume = make_volume({70, 33, 9}, ScalarType::u8, [](auto x, auto, auto) { return 3 * x; });
+    BricksPtr bricks = make_dense_pyramid(volume, glm::ivec3(16), PyramidFilter::subsample);
+    NodeRun r = run("{preset: materials}", bricks);
+    EXPECT_EQ(r.measured("range_min"), 0);
+    EXPECT_EQ(r.measured("range_max"), 207);
+    EXPECT_LT(r.measured("boundary_1"), r.measured("boundary_3"));
+    for (Index3 dims : {Index3(0), Index3(1)}) {
+        auto small = make_volume(dims, ScalarType::i16, [](auto...) { return 5; });
+        for (const char* set : {"{}", "{preset: materials}"})
+            EXPECT_NO_THROW(run(set, make_dense_pyramid(small, glm::ivec3(16), PyramidFilter::average)));
+    }
+}
+
 TEST(Transfer, UnitesTheRangesOfASeries) {
     class Steps final : public Series {
       public:
@@ -118,6 +133,9 @@ TEST(Transfer, UnitesTheRangesOfASeries) {
     EXPECT_EQ(run("{}", series).measured("range_max"), 31);
     EXPECT_EQ(run("{range_steps: 1}", series).measured("range_max"), 1);
     EXPECT_EQ(run("{range_steps: 2}", series).measured("range_max"), 31);
+    EXPECT_NO_THROW(run("{preset: materials}", series));
+    desc.times.clear();
+    EXPECT_NO_THROW(run("{preset: materials}", SeriesPtr(std::make_shared<Steps>(desc))));
 }
 
 TEST(Transfer, IsDenserByItsScaleAndTheSameForEveryReferenceLength) {
