@@ -341,7 +341,7 @@ NodeType transfer_node() {
             .in_group("Colour").shown_if("preset", with_map),
         param::real("ramp_start", 0.1, "Where the ramp begins to be seen.")
             .range(-kMost, kMost).slider(0, 1).in_group("Ramp").shown_if("preset", {"ramp"}),
-        param::real("ramp_end", 1, "From where on the ramp is fully opaque; below the start it falls.")
+        param::real("ramp_end", 1, "From where on it has its full opacity; may lie below the start.")
             .range(-kMost, kMost).slider(0, 1).in_group("Ramp").shown_if("preset", {"ramp"}),
         param::real("ramp_opacity", 0.2, "Opacity at the upper end of the ramp.")
             .range(0, 1).slider(0, 1).in_group("Ramp").shown_if("preset", {"ramp"}),
