@@ -23,28 +23,45 @@ std::vector<std::string> type_names() {
 }
 
 void add_grid_params(std::vector<ParamSpec>& params, std::vector<double> dims) {
-    params.insert(params.end(), {
-        param::vector("dims", std::move(dims), "Voxels along x, y and z.")
-            .range(0, 1e9).slider(1, 512).whole().in_unit("voxels").in_group("grid"),
-        param::choice("type", type_names(), "u8", "Scalar type of the voxels.").in_group("grid"),
-        param::vector("spacing", {1, 1, 1}, "World length from voxel to voxel along each axis.")
-            .range(1e-90, 1e90).slider(0.1, 10, Scale::logarithmic).in_group("grid"),
-        param::vector("origin", {0, 0, 0}, "World position of the first voxel.")
-            .range(-1e90, 1e90).in_group("grid"),
-        param::vector("rotation", {0, 0, 1, 0},
-                      "Turn of the grid in the world about its first voxel: an axis and an angle in degrees.")
-            .range(-1e6, 1e6).in_group("grid"),
-        param::text("unit", "", "Unit of world lengths.").in_group("grid"),
-        param::choice("fit", {"inside", "outside", "stretch"}, "inside",
-                      "How the phantom's cube meets a grid that is none: inside it, around it, or "
-                      "stretched over it axis by axis.").in_group("grid"),
-        param::real("low", 0,
-                    "Stored value of the phantom's smallest value; low and high equal: the full range "
-                    "of integer types, the natural one of floats.")
-            .range(-1e90, 1e90).in_group("values"),
-        param::real("high", 0, "Stored value of the phantom's largest value.")
-            .range(-1e90, 1e90).in_group("values"),
-    });
+    params.insert(
+        params.end(),
+        {
+            param::vector("dims", std::move(dims), "Voxels along x, y and z.")
+                .range(0, 1e9)
+                .slider(1, 512)
+                .whole()
+                .in_unit("voxels")
+                .in_group("grid"),
+            param::choice("type", type_names(), "u8", "Scalar type of the voxels.")
+                .in_group("grid"),
+            param::vector("spacing", {1, 1, 1}, "World length from voxel to voxel along each axis.")
+                .range(1e-90, 1e90)
+                .slider(0.1, 10, Scale::logarithmic)
+                .in_group("grid"),
+            param::vector("origin", {0, 0, 0}, "World position of the first voxel.")
+                .range(-1e90, 1e90)
+                .in_group("grid"),
+            param::vector("rotation", {0, 0, 1, 0},
+                          "Turn of the grid in the world about its first voxel: an axis and an "
+                          "angle in degrees.")
+                .range(-1e6, 1e6)
+                .in_group("grid"),
+            param::text("unit", "", "Unit of world lengths.").in_group("grid"),
+            param::choice(
+                "fit", {"inside", "outside", "stretch"}, "inside",
+                "How the phantom's cube meets a grid that is none: inside it, around it, or "
+                "stretched over it axis by axis.")
+                .in_group("grid"),
+            param::real(
+                "low", 0,
+                "Stored value of the phantom's smallest value; low and high equal: the full range "
+                "of integer types, the natural one of floats.")
+                .range(-1e90, 1e90)
+                .in_group("values"),
+            param::real("high", 0, "Stored value of the phantom's largest value.")
+                .range(-1e90, 1e90)
+                .in_group("values"),
+        });
 }
 
 struct Grid {
@@ -65,7 +82,8 @@ Grid grid_of(const Params& params) {
     const glm::dvec3 axis(turn[0], turn[1], turn[2]);
     glm::dmat4 world = glm::translate(glm::dmat4(1.0), params.vec3("origin"));
     if (turn[3] != 0) {
-        if (glm::length(axis) <= 0) fail("the axis of the rotation has no length; give one that is not 0");
+        if (glm::length(axis) <= 0)
+            fail("the axis of the rotation has no length; give one that is not 0");
         world = glm::rotate(world, glm::radians(turn[3]), glm::normalize(axis));
     }
     desc.index_to_world = glm::scale(world, spacing);
@@ -91,9 +109,12 @@ Grid grid_of(const Params& params) {
 // Maps the natural range to the one that is asked for, or to what the field stores by default.
 void set_range(const Params& params, const Field& field, ScalarType type, PhantomFinish& finish) {
     const ValueRange natural = field.natural();
-    if (natural.extent() <= 0) return;  // a constant is stored as it is
     ValueRange stored{params.real("low"), params.real("high")};
-    if (stored.extent() == 0) stored = field.stored_range(type);
+    if (stored.extent() == 0 || natural.extent() <= 0) stored = field.stored_range(type);
+    for (double v : {stored.min, stored.max})
+        if (type == ScalarType::f32 && std::abs(v) > limits_of(type).second && std::isfinite(v))
+            fail("values up to {} do not fit in f32; take type f64 or a smaller range", v);
+    if (natural.extent() <= 0) return;  // a constant is stored as it is
     finish.gain = stored.extent() / natural.extent();
     finish.offset = stored.min - finish.gain * natural.min;
 }
@@ -107,7 +128,8 @@ FieldPtr field_of(const Params& params, const Grid& grid) {
         return marschner_lobb_field(params.real("frequency"), params.real("alpha"));
     if (kind == "ramp") {
         glm::dvec3 direction = params.vec3("direction");
-        if (glm::length(direction) <= 0) fail("the direction of the ramp has no length; give one that is not 0");
+        if (glm::length(direction) <= 0)
+            fail("the direction of the ramp has no length; give one that is not 0");
         return ramp_field(direction, g);
     }
     if (kind == "sphere-distance")
@@ -118,7 +140,8 @@ FieldPtr field_of(const Params& params, const Grid& grid) {
         for (int a = 0; a < 3; ++a) {
             if (at[a] < 0) at[a] = g.dims[a] / 2;
             if (at[a] >= g.dims[a] && g.dims[a] > 0)
-                fail("the impulse at {} on axis {} is outside of {} voxels", at[a], "xyz"[a], g.dims[a]);
+                fail("the impulse at {} on axis {} is outside of {} voxels", at[a], "xyz"[a],
+                     g.dims[a]);
         }
         return impulse_field(at, g);
     }
@@ -156,7 +179,8 @@ Phantom phantom_of(const Params& params) {
                                              : Special::none;
     finish.special_share = params.real("special_share");
     if (finish.special != Special::none && !is_float(desc.type))
-        fail("{} voxels cannot be {}; take type f32 or f64, or special: none", name_of(desc.type), special);
+        fail("{} voxels cannot be {}; take type f32 or f64, or special: none", name_of(desc.type),
+             special);
     desc.name = params.text("kind");
     desc.significant_bits = phantom.field->significant_bits(desc.type);
     desc.has_mask = finish.masked_share > 0;
@@ -168,8 +192,8 @@ NodeType phantom_type() {
     type.id = "readers.phantom";
     type.title = "Phantom";
     type.doc = "Makes an analytic volume of any size and scalar type, computed where it is read.";
-    type.keywords = {"analytic", "test", "synthetic", "marschner-lobb", "ramp", "sphere", "checkerboard",
-                     "impulse", "shells", "plane waves", "ct", "head"};
+    type.keywords = {"analytic",     "test",    "synthetic", "marschner-lobb", "ramp", "sphere",
+                     "checkerboard", "impulse", "shells",    "plane waves",    "ct",   "head"};
     type.outputs = {{"volume", PortType::volume, "The phantom, with its closed form."}};
     type.params = {
         param::choice("kind",
@@ -177,45 +201,84 @@ NodeType phantom_type() {
                        "checkerboard", "step", "shells", "plane-waves", "ct-head"},
                       "marschner-lobb", "Which function of space."),
         param::real("frequency", 6, "Marschner-Lobb: f_M, waves of the radial part.")
-            .range(0, 1e6).slider(0, 20).shown_if("kind", {"marschner-lobb"}),
-        param::real("alpha", 0.25, "Marschner-Lobb: weight of the radial part against the ramp in z.")
-            .range(0, 1e6).slider(0, 1).shown_if("kind", {"marschner-lobb"}),
-        param::vector("direction", {1, 0, 0}, "Ramp: its gradient, in phantom units along the grid's axes.")
-            .range(-1e6, 1e6).shown_if("kind", {"ramp"}),
+            .range(0, 1e6)
+            .slider(0, 20)
+            .shown_if("kind", {"marschner-lobb"}),
+        param::real("alpha", 0.25,
+                    "Marschner-Lobb: weight of the radial part against the ramp in z.")
+            .range(0, 1e6)
+            .slider(0, 1)
+            .shown_if("kind", {"marschner-lobb"}),
+        param::vector("direction", {1, 0, 0},
+                      "Ramp: its gradient, in phantom units along the grid's axes.")
+            .range(-1e6, 1e6)
+            .shown_if("kind", {"ramp"}),
         param::real("radius", 0.6, "Sphere distance: radius of the sphere, 1 being half the cube.")
-            .range(0, 1e6).slider(0, 1).shown_if("kind", {"sphere-distance"}),
+            .range(0, 1e6)
+            .slider(0, 1)
+            .shown_if("kind", {"sphere-distance"}),
         param::real("value", 1, "Constant: the voxels' value, clamped to the type.")
             .shown_if("kind", {"constant"}),
-        param::vector("at", {-1, -1, -1}, "Impulse: the voxel that is high; -1: the middle of the axis.")
-            .range(-1, 1e9).whole().in_unit("voxels").shown_if("kind", {"impulse"}),
+        param::vector("at", {-1, -1, -1},
+                      "Impulse: the voxel that is high; -1: the middle of the axis.")
+            .range(-1, 1e9)
+            .whole()
+            .in_unit("voxels")
+            .shown_if("kind", {"impulse"}),
         param::choice("axis", {"x", "y", "z"}, "x", "Step: the axis along which the value jumps.")
             .shown_if("kind", {"step"}),
         param::real("position", 0.5, "Step: share of the axis that is low.")
-            .range(0, 1).slider(0, 1).shown_if("kind", {"step"}),
+            .range(0, 1)
+            .slider(0, 1)
+            .shown_if("kind", {"step"}),
         param::real("shells", 6, "Shells: how many from the centre to the cube's face.")
-            .range(0, 1e6).slider(1, 32).shown_if("kind", {"shells"}),
+            .range(0, 1e6)
+            .slider(1, 32)
+            .shown_if("kind", {"shells"}),
         param::integer("waves", 16, "Plane waves: how many are summed.")
-            .range(1, 100000).slider(1, 64).shown_if("kind", {"plane-waves"}),
-        param::real("band", 0.5, "Plane waves: largest frequency as a share of the grid's band limit.")
-            .range(0, 100).slider(0, 1).shown_if("kind", {"plane-waves"}),
-        param::real("edge", 0.02, "CT head: width of the edges between tissues, 1 being half the cube.")
-            .range(1e-6, 1).slider(0.002, 0.1, Scale::logarithmic).shown_if("kind", {"ct-head"}),
+            .range(1, 1000)
+            .slider(1, 64)
+            .shown_if("kind", {"plane-waves"}),
+        param::real("band", 0.5,
+                    "Plane waves: largest frequency as a share of the grid's band limit.")
+            .range(0, 100)
+            .slider(0, 1)
+            .shown_if("kind", {"plane-waves"}),
+        param::real("edge", 0.02,
+                    "CT head: width of the edges between tissues, 1 being half the cube.")
+            .range(1e-6, 1)
+            .slider(0.002, 0.1, Scale::logarithmic)
+            .shown_if("kind", {"ct-head"}),
         param::integer("seed", 1, "Seed of everything random: waves, noise, special values, mask.")
-            .range(0, 4294967295.0).in_group("values"),
+            .range(0, 4294967295.0)
+            .in_group("values"),
         param::real("noise", 0,
-                    "Standard deviation of noise, in the phantom's natural units (Hounsfield units for the head).")
-            .range(0, 1e9).slider(0, 50).in_group("values"),
+                    "Standard deviation of noise, in the phantom's natural units (Hounsfield units "
+                    "for the head).")
+            .range(0, 1e9)
+            .slider(0, 50)
+            .in_group("values"),
         param::choice("special", {"none", "nan", "inf", "denormal"}, "none",
-                      "Special values sprinkled over the voxels of float types.").in_group("values").for_experts(),
+                      "Special values sprinkled over the voxels of float types.")
+            .in_group("values")
+            .for_experts(),
         param::real("special_share", 0.001, "Share of the voxels that are special.")
-            .range(0, 1).slider(1e-5, 1, Scale::logarithmic).shown_if("special", {"nan", "inf", "denormal"})
-            .in_group("values").for_experts(),
-        param::real("masked_share", 0, "Share of the voxels that a validity mask marks as invalid; 0: no mask.")
-            .range(0, 1).slider(0, 1).in_group("values").for_experts(),
+            .range(0, 1)
+            .slider(1e-5, 1, Scale::logarithmic)
+            .shown_if("special", {"nan", "inf", "denormal"})
+            .in_group("values")
+            .for_experts(),
+        param::real("masked_share", 0,
+                    "Share of the voxels that a validity mask marks as invalid; 0: no mask.")
+            .range(0, 1)
+            .slider(0, 1)
+            .in_group("values")
+            .for_experts(),
     };
     add_grid_params(type.params, {64, 64, 64});
     type.cacheable = false;
-    type.method = R"(Evaluates a closed formula at the voxels that are read, row by row and in parallel; nothing is held,
+    type.method =
+        R"(Evaluates a closed formula at the voxels that are read, row by row and in parallel; nothing is held,
 so that a phantom of ten gigabytes costs no memory. The volume carries its value and gradient in
 world coordinates, against which reconstruction and rendering are tested without interpolation.
 
@@ -249,7 +312,8 @@ S. Marschner and R. Lobb, An evaluation of reconstruction filters for volume ren
     };
     type.evaluate = [](Evaluation& e) {
         Phantom phantom = phantom_of(e.params());
-        e.output("volume", make_phantom(phantom.grid.desc, phantom.field, phantom.grid.phantom, phantom.finish));
+        e.output("volume", make_phantom(phantom.grid.desc, phantom.field, phantom.grid.phantom,
+                                        phantom.finish));
     };
     return type;
 }
@@ -260,34 +324,40 @@ S. Marschner and R. Lobb, An evaluation of reconstruction filters for volume ren
 std::vector<double> times_of(const Params& params) {
     if (const std::vector<double>& given = params.numbers("times"); !given.empty()) {
         for (std::size_t i = 1; i < given.size(); ++i)
-            if (!(given[i - 1] < given[i])) fail("the times must increase, {} stands before {}", given[i - 1], given[i]);
+            if (!(given[i - 1] < given[i]))
+                fail("the times must increase, {} stands before {}", given[i - 1], given[i]);
         return given;
     }
     std::vector<double> times(std::size_t(params.integer("steps")));
     SeededNumbers random(std::uint64_t(params.integer("seed")));
     for (std::size_t i = 0; i < times.size(); ++i)
-        times[i] = params.real("time_step") * (double(i) + params.real("unevenness") * (random.next() - 0.5));
+        times[i] = params.real("time_step") *
+                   (double(i) + params.real("unevenness") * (random.next() - 0.5));
     return times;
 }
 
-FieldPtr field_at(const Params& params, const Grid& grid, const std::vector<double>& times, double time) {
+FieldPtr field_at(const Params& params, const Grid& grid, const std::vector<double>& times,
+                  double time) {
     const std::string& kind = params.text("kind");
     const PhantomGrid& g = grid.phantom;
     const double turns = time / params.real("period");
     const auto seed = std::uint64_t(params.integer("seed"));
     if (kind == "moving-sphere") {
         const double angle = 2 * kPi * turns;
-        const glm::dvec3 at = 0.4 * glm::dvec3(std::cos(angle), std::sin(angle), 0.5 * std::sin(angle));
+        const glm::dvec3 at =
+            0.4 * glm::dvec3(std::cos(angle), std::sin(angle), 0.5 * std::sin(angle));
         return sphere_distance_field(at, 0.5, 0.4, grid.scale, g);
     }
     if (kind == "rotating-waves")
-        return plane_waves_field(int(params.integer("waves")), params.real("band"), seed, 2 * kPi * turns, g);
+        return plane_waves_field(int(params.integer("waves")), params.real("band"), seed,
+                                 2 * kPi * turns, g);
     if (kind == "pulsating-shells") return shells_field(params.real("shells"), turns);
     // Linear in time from the first step to the last: exact under linear interpolation.
     const double length = times.size() > 1 ? times.back() - times.front() : 1;
-    return blend_field(plane_waves_field(int(params.integer("waves")), params.real("band"), seed, 0, g),
-                       plane_waves_field(int(params.integer("waves")), params.real("band"), seed + 1, 0, g),
-                       (time - times.front()) / length);
+    return blend_field(
+        plane_waves_field(int(params.integer("waves")), params.real("band"), seed, 0, g),
+        plane_waves_field(int(params.integer("waves")), params.real("band"), seed + 1, 0, g),
+        (time - times.front()) / length);
 }
 
 class PhantomSeries final : public Series {
@@ -296,13 +366,16 @@ class PhantomSeries final : public Series {
         : Series(std::move(desc)), params_(std::move(params)), grid_(std::move(grid)) {
         // One mapping for all times, or the values of two steps could not be compared.
         if (!this->desc().times.empty())
-            set_range(params_, *field_at(params_, grid_, this->desc().times, this->desc().times.front()),
+            set_range(params_,
+                      *field_at(params_, grid_, this->desc().times, this->desc().times.front()),
                       grid_.desc.type, finish_);
     }
     Value fetch(std::size_t i, const std::stop_token& stop) const override {
         check_stop(stop);
-        if (i >= desc().times.size()) fail("phantom series: step {} of {} is not there", i, desc().times.size());
-        return make_phantom(grid_.desc, field_at(params_, grid_, desc().times, desc().times[i]), grid_.phantom, finish_);
+        if (i >= desc().times.size())
+            fail("phantom series: step {} of {} is not there", i, desc().times.size());
+        return make_phantom(grid_.desc, field_at(params_, grid_, desc().times, desc().times[i]),
+                            grid_.phantom, finish_);
     }
 
   private:
@@ -326,31 +399,49 @@ NodeType series_type() {
     NodeType type;
     type.id = "readers.phantom-series";
     type.title = "Moving phantom";
-    type.doc = "Makes a series of analytic volumes that move, turn, pulsate or change linearly in time.";
+    type.doc =
+        "Makes a series of analytic volumes that move, turn, pulsate or change linearly in time.";
     type.keywords = {"analytic", "test", "synthetic", "time", "4-D", "moving", "animation"};
     type.outputs = {{"series", PortType::series, "The phantom at each time."}};
     type.params = {
-        param::choice("kind", {"moving-sphere", "rotating-waves", "pulsating-shells", "linear-in-time"},
+        param::choice("kind",
+                      {"moving-sphere", "rotating-waves", "pulsating-shells", "linear-in-time"},
                       "moving-sphere", "Which function of space and time."),
-        param::integer("steps", 10, "Number of times.").range(1, 1000000).slider(1, 100).in_group("time"),
+        param::integer("steps", 10, "Number of times.")
+            .range(1, 1000000)
+            .slider(1, 100)
+            .in_group("time"),
         param::real("time_step", 1, "Time from step to step.").range(1e-12, 1e12).in_group("time"),
         param::real("unevenness", 0, "Seeded shifts of the times, as a share of the time step.")
-            .range(0, 0.99).slider(0, 0.99).in_group("time"),
+            .range(0, 0.99)
+            .slider(0, 0.99)
+            .in_group("time"),
         param::list("times", {}, "The times themselves, increasing, instead of steps.")
-            .range(-1e12, 1e12).in_group("time"),
+            .range(-1e12, 1e12)
+            .in_group("time"),
         param::text("time_unit", "s", "Unit of the times.").in_group("time"),
-        param::real("period", 10, "Time of one orbit, turn or pulse.").range(1e-12, 1e12).slider(1, 100).in_group("time"),
+        param::real("period", 10, "Time of one orbit, turn or pulse.")
+            .range(1e-12, 1e12)
+            .slider(1, 100)
+            .in_group("time"),
         param::real("shells", 6, "Shells from the centre to the cube's face.")
-            .range(0, 1e6).slider(1, 32).shown_if("kind", {"pulsating-shells"}),
+            .range(0, 1e6)
+            .slider(1, 32)
+            .shown_if("kind", {"pulsating-shells"}),
         param::integer("waves", 16, "How many waves are summed.")
-            .range(1, 100000).slider(1, 64).shown_if("kind", {"rotating-waves", "linear-in-time"}),
+            .range(1, 1000)
+            .slider(1, 64)
+            .shown_if("kind", {"rotating-waves", "linear-in-time"}),
         param::real("band", 0.5, "Largest frequency as a share of the grid's band limit.")
-            .range(0, 100).slider(0, 1).shown_if("kind", {"rotating-waves", "linear-in-time"}),
+            .range(0, 100)
+            .slider(0, 1)
+            .shown_if("kind", {"rotating-waves", "linear-in-time"}),
         param::integer("seed", 1, "Seed of the waves and of uneven times.").range(0, 4294967294.0),
     };
     add_grid_params(type.params, {32, 32, 32});
     type.cacheable = false;
-    type.method = R"(Each step is a phantom of its own, computed where it is read. The mapping to stored values is the
+    type.method =
+        R"(Each step is a phantom of its own, computed where it is read. The mapping to stored values is the
 same for all times. `moving-sphere` is the distance to a sphere on a tilted orbit, `rotating-waves` a
 sum of plane waves that turns about z, `pulsating-shells` concentric waves that run outwards, and
 `linear-in-time` runs straight from one sum of plane waves to another, so that linear interpolation
@@ -370,7 +461,8 @@ constant step.)";
     type.evaluate = [](Evaluation& e) {
         Grid grid;
         SeriesDesc desc = series_of(e.params(), grid);
-        e.output("series", std::make_shared<const PhantomSeries>(std::move(desc), e.params(), grid));
+        e.output("series",
+                 std::make_shared<const PhantomSeries>(std::move(desc), e.params(), grid));
     };
     return type;
 }

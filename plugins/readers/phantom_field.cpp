@@ -22,8 +22,7 @@ inline double marschner_lobb(double rr, double f, double alpha, double z_part) {
 
 VOXLOOM_WIDE void marschner_lobb_row(const double* x, std::size_t n, double yy, double f,
                                      double alpha, double z_part, double* out) {
-    for (std::size_t i = 0; i < n; ++i)
-        out[i] = marschner_lobb(x[i] * x[i] + yy, f, alpha, z_part);
+    for (std::size_t i = 0; i < n; ++i) out[i] = marschner_lobb(x[i] * x[i] + yy, f, alpha, z_part);
 }
 
 VOXLOOM_WIDE void sphere_row(const double* x, std::size_t n, double cx, double yz, double radius,
@@ -55,10 +54,11 @@ class MarschnerLobb final : public Field {
     dvec3 gradient(dvec3 p) const override {
         const double r = std::sqrt(p.x * p.x + p.y * p.y);
         const double inner = kPi * r / 2;
-        // d rho/dr = sin(2 pi f cos(pi r/2)) * 2 pi f * sin(pi r/2) * pi/2, and sin(pi r/2)/r -> pi/2.
+        // d rho/dr = sin(2 pi f cos(pi r/2)) * 2 pi f * sin(pi r/2) * pi/2, and sin(pi r/2)/r ->
+        // pi/2.
         const double over_r = r > 1e-9 ? std::sin(inner) / r : kPi / 2;
-        const double radial = alpha_ * std::sin(2 * kPi * f_ * std::cos(inner)) * 2 * kPi * f_ *
-                              over_r * kPi / 2;
+        const double radial =
+            alpha_ * std::sin(2 * kPi * f_ * std::cos(inner)) * 2 * kPi * f_ * over_r * kPi / 2;
         return {radial * p.x, radial * p.y, -gain_ * kPi / 2 * std::cos(kPi * p.z / 2)};
     }
     ValueRange natural() const override { return {0, 1}; }
@@ -93,7 +93,8 @@ class Ramp final : public Field {
 
 class SphereDistance final : public Field {
   public:
-    SphereDistance(dvec3 centre, double travel, double radius, double scale, const PhantomGrid& grid)
+    SphereDistance(dvec3 centre, double travel, double radius, double scale,
+                   const PhantomGrid& grid)
         : centre_(centre), radius_(radius), scale_(scale) {
         const double far = glm::length(grid.reach()) + travel;  // of the farthest corner
         range_ = {-radius * scale, std::max(far - radius, 0.0) * scale};
@@ -138,7 +139,8 @@ class Impulse final : public Field {
     Impulse(Index3 at, const PhantomGrid& grid) : at_(at), grid_(grid) {}
     double value(dvec3 p) const override { return hat(0, p.x) * hat(1, p.y) * hat(2, p.z); }
     dvec3 gradient(dvec3 p) const override {
-        return {slope(0, p.x) * hat(1, p.y) * hat(2, p.z), hat(0, p.x) * slope(1, p.y) * hat(2, p.z),
+        return {slope(0, p.x) * hat(1, p.y) * hat(2, p.z),
+                hat(0, p.x) * slope(1, p.y) * hat(2, p.z),
                 hat(0, p.x) * hat(1, p.y) * slope(2, p.z)};
     }
     ValueRange natural() const override { return {0, 1}; }
@@ -167,7 +169,8 @@ class Checkerboard final : public Field {
     explicit Checkerboard(const PhantomGrid& grid) : grid_(grid) {}
     double value(dvec3 p) const override { return wave(0, p.x) * wave(1, p.y) * wave(2, p.z); }
     dvec3 gradient(dvec3 p) const override {
-        return {slope(0, p.x) * wave(1, p.y) * wave(2, p.z), wave(0, p.x) * slope(1, p.y) * wave(2, p.z),
+        return {slope(0, p.x) * wave(1, p.y) * wave(2, p.z),
+                wave(0, p.x) * slope(1, p.y) * wave(2, p.z),
                 wave(0, p.x) * wave(1, p.y) * slope(2, p.z)};
     }
     ValueRange natural() const override { return {-1, 1}; }
@@ -176,7 +179,8 @@ class Checkerboard final : public Field {
     void row(std::span<const double> x, double y, double z, double* out) const override {
         // At the voxels the cosines are exact.
         const std::int64_t yz = whole(1, y) + whole(2, z);
-        for (std::size_t i = 0; i < x.size(); ++i) out[i] = ((whole(0, x[i]) + yz) & 1) ? -1.0 : 1.0;
+        for (std::size_t i = 0; i < x.size(); ++i)
+            out[i] = ((whole(0, x[i]) + yz) & 1) ? -1.0 : 1.0;
     }
 
   private:
@@ -236,7 +240,8 @@ class PlaneWaves final : public Field {
             const double radius = limit * std::cbrt(random.next());  // uniform in the ball
             const double flat = std::sqrt(std::max(0.0, 1 - z * z));
             const dvec3 w(flat * std::cos(angle), flat * std::sin(angle), z);
-            waves_.push_back({radius * dvec3(c * w.x - s * w.y, s * w.x + c * w.y, w.z), random.next()});
+            waves_.push_back(
+                {radius * dvec3(c * w.x - s * w.y, s * w.x + c * w.y, w.z), random.next()});
         }
     }
     // The same products as row(): cos(a + b) = cos a cos b - sin a sin b.
@@ -376,15 +381,21 @@ FieldPtr sphere_distance_field(dvec3 centre, double travel, double radius, doubl
                                const PhantomGrid& grid) {
     return std::make_shared<SphereDistance>(centre, travel, radius, scale, grid);
 }
-FieldPtr constant_field(double value) { return std::make_shared<Constant>(value); }
+FieldPtr constant_field(double value) {
+    return std::make_shared<Constant>(value);
+}
 FieldPtr impulse_field(Index3 at, const PhantomGrid& grid) {
     return std::make_shared<Impulse>(at, grid);
 }
-FieldPtr checkerboard_field(const PhantomGrid& grid) { return std::make_shared<Checkerboard>(grid); }
+FieldPtr checkerboard_field(const PhantomGrid& grid) {
+    return std::make_shared<Checkerboard>(grid);
+}
 FieldPtr step_field(int axis, std::int64_t first_high, const PhantomGrid& grid) {
     return std::make_shared<Step>(axis, first_high, grid);
 }
-FieldPtr shells_field(double count, double phase) { return std::make_shared<Shells>(count, phase); }
+FieldPtr shells_field(double count, double phase) {
+    return std::make_shared<Shells>(count, phase);
+}
 FieldPtr plane_waves_field(int count, double fraction, std::uint64_t seed, double turn,
                            const PhantomGrid& grid) {
     return std::make_shared<PlaneWaves>(count, fraction, seed, turn, grid);

@@ -21,9 +21,7 @@ struct PhantomGrid {
     double coordinate(int axis, double index) const {
         return (index - double(dims[axis] - 1) * 0.5) * step[axis];
     }
-    double index(int axis, double p) const {
-        return p / step[axis] + double(dims[axis] - 1) * 0.5;
-    }
+    double index(int axis, double p) const { return p / step[axis] + double(dims[axis] - 1) * 0.5; }
     glm::dvec3 reach() const;  // largest coordinate on each axis, at the last voxel
 };
 
@@ -54,7 +52,8 @@ class Field {
 using FieldPtr = std::shared_ptr<const Field>;
 
 // Marschner and Lobb 1994: ((1 - sin(pi z/2)) + a (1 + rho(r))) / (2 (1 + a)),
-// rho(r) = cos(2 pi f cos(pi r/2)), r = |(x, y)|: nearly all of its energy near the band limit of 40^3.
+// rho(r) = cos(2 pi f cos(pi r/2)), r = |(x, y)|: nearly all of its energy near the band limit of
+// 40^3.
 FieldPtr marschner_lobb_field(double frequency, double alpha);
 // dot(direction, p); the natural range is what the grid's box reaches.
 FieldPtr ramp_field(glm::dvec3 direction, const PhantomGrid& grid);
@@ -100,7 +99,9 @@ inline double cos_turns(double t) {
     poly = poly * s - 1.0 / 6.0;
     return y + y * s * poly;
 }
-inline double sin_turns(double t) { return cos_turns(t - 0.25); }
+inline double sin_turns(double t) {
+    return cos_turns(t - 0.25);
+}
 
 // Hot loops are compiled once more for wider registers. AVX2 without FMA: a fused multiply-add
 // would round differently and make the voxels depend on the machine. Sanitizers run before the

@@ -1,9 +1,9 @@
 // The head: some eighty ellipsoids, painted one over the other like the parts of a wax model.
 //
 // Part k covers a point by c = smooth step of the distance to its surface, `edge` wide (thin parts
-// have thinner edges), and mixes its Hounsfield units in: v <- (1 - c) v + c h. The order of the list is the order of painting, so
-// a shell is a large part and a smaller one over it. The field is C1, and its gradient follows the
-// same recurrence.
+// have thinner edges), and mixes its Hounsfield units in: v <- (1 - c) v + c h. The order of the
+// list is the order of painting, so a shell is a large part and a smaller one over it. The field is
+// C1, and its gradient follows the same recurrence.
 //
 // A row meets few parts, and those mostly inside, where c is 1: the row's interval with each part
 // is found first, the inner part of it is filled, and only edges are evaluated.
@@ -20,7 +20,8 @@ namespace {
 using glm::dvec3;
 
 constexpr double kAir = -1000, kFat = -90, kSkin = 30, kMuscle = 55, kWater = 5, kGrey = 38,
-                 kWhite = 28, kBlood = 75, kSponge = 450, kBone = 1200, kTooth = 2200, kMetal = 3071;
+                 kWhite = 28, kBlood = 75, kSponge = 450, kBone = 1200, kTooth = 2200,
+                 kMetal = 3071;
 
 struct Part {
     double hounsfield;
@@ -100,7 +101,8 @@ std::vector<Part> head() {
     add(kWater, {0, 0.38, -0.75}, {0.070, 0.055, 0.60});
     add(kGrey, {0, 0.38, -0.75}, {0.045, 0.035, 0.60});
     // Air: frontal, maxillary and sphenoid sinuses, nose, mouth, throat.
-    pair(kAir, {0.10, -0.775, 0.10}, {0.09, 0.045, 0.08}, 0.2);
+    pair(kBone, {0.10, -0.745, 0.10}, {0.12, 0.055, 0.10}, 0.2);
+    pair(kAir, {0.10, -0.750, 0.10}, {0.09, 0.035, 0.07}, 0.2);
     pair(kAir, {0.21, -0.52, -0.31}, {0.10, 0.15, 0.13});
     add(kAir, {0, -0.22, -0.18}, {0.11, 0.10, 0.08});
     pair(kAir, {0.055, -0.56, -0.28}, {0.030, 0.30, 0.12});
@@ -119,7 +121,8 @@ std::vector<Part> head() {
     for (int row = 0; row < 2; ++row)
         for (int k = -6; k <= 6; ++k) {
             const double angle = 0.19 * k;
-            const dvec3 at(0.27 * std::sin(angle), -0.50 - 0.29 * std::cos(angle), row ? -0.575 : -0.495);
+            const dvec3 at(0.27 * std::sin(angle), -0.50 - 0.29 * std::cos(angle),
+                           row ? -0.575 : -0.495);
             const bool filled = (row == 0 && k == 5) || (row == 1 && k == -4);
             add(kTooth, at, {0.026, 0.030, 0.045});
             if (filled) add(kMetal, at, {0.020, 0.020, 0.024});
@@ -133,7 +136,7 @@ struct Shape {
     double hounsfield;
     dvec3 centre, inverse_radii, bounds;  // bounds: half extents of the outer edge's box
     double cosine, sine;
-    double steepness;                     // smallest radius / width of the edge
+    double steepness;  // smallest radius / width of the edge
 };
 constexpr double kSmallestSteepness = 1.7;  // the edge takes at most 0.3 of a radius on either side
 
@@ -165,8 +168,13 @@ class CtHead final : public Field {
     explicit CtHead(double edge) {
         for (const Part& part : head()) {
             const double smallest = std::min({part.radii.x, part.radii.y, part.radii.z});
-            Shape s{part.hounsfield, part.centre, 1.0 / part.radii, {}, std::cos(part.tilt),
-                    std::sin(part.tilt), std::max(smallest / edge, kSmallestSteepness)};
+            Shape s{part.hounsfield,
+                    part.centre,
+                    1.0 / part.radii,
+                    {},
+                    std::cos(part.tilt),
+                    std::sin(part.tilt),
+                    std::max(smallest / edge, kSmallestSteepness)};
             const dvec3 outer = part.radii * outer_q(s);
             s.bounds = {outer.x, std::hypot(s.cosine * outer.y, s.sine * outer.z),
                         std::hypot(s.sine * outer.y, s.cosine * outer.z)};
@@ -208,10 +216,13 @@ class CtHead final : public Field {
     ValueRange stored_range(ScalarType type) const override {
         switch (type) {
             case ScalarType::u16:
-            case ScalarType::u32: return {0, 4095};
+            case ScalarType::u32:
+                return {0, 4095};
             case ScalarType::u8:
-            case ScalarType::i8: return Field::stored_range(type);
-            default: return natural();
+            case ScalarType::i8:
+                return Field::stored_range(type);
+            default:
+                return natural();
         }
     }
     int significant_bits(ScalarType type) const override {
@@ -222,14 +233,17 @@ class CtHead final : public Field {
     void row(std::span<const double> x, double y, double z, double* out) const override {
         std::fill_n(out, x.size(), kAir);
         for (const Shape& s : shapes_) {
-            if (std::abs(y - s.centre.y) >= s.bounds.y || std::abs(z - s.centre.z) >= s.bounds.z) continue;
+            if (std::abs(y - s.centre.y) >= s.bounds.y || std::abs(z - s.centre.z) >= s.bounds.z)
+                continue;
             const dvec3 u = scaled(s, {0.0, y - s.centre.y, z - s.centre.z});
             const double rest = u.y * u.y + u.z * u.z;
-            const double outer = half_width(s, outer_q(s), rest), inner = half_width(s, inner_q(s), rest);
+            const double outer = half_width(s, outer_q(s), rest),
+                         inner = half_width(s, inner_q(s), rest);
             if (outer <= 0) continue;
             // Outside of `outer` c is 0 and inside of `inner` it is 1, with a little to spare, so
             // the bits are those of value() wherever the interval is cut.
-            const std::size_t a = first_above(x, s.centre.x - outer), d = first_above(x, s.centre.x + outer);
+            const std::size_t a = first_above(x, s.centre.x - outer),
+                              d = first_above(x, s.centre.x + outer);
             std::size_t b = d, c = d;
             if (inner > 0) {
                 b = first_above(x, s.centre.x - inner);
@@ -263,6 +277,8 @@ class CtHead final : public Field {
 
 }  // namespace
 
-FieldPtr ct_head_field(double edge) { return std::make_shared<CtHead>(edge); }
+FieldPtr ct_head_field(double edge) {
+    return std::make_shared<CtHead>(edge);
+}
 
 }  // namespace voxloom

@@ -15,7 +15,9 @@ inline std::uint64_t scatter(std::uint64_t x) {
 }
 
 // Uniform in [0, 1).
-inline double unit_number(std::uint64_t bits) { return double(bits >> 11) * 0x1p-53; }
+inline double unit_number(std::uint64_t bits) {
+    return double(bits >> 11) * 0x1p-53;
+}
 
 // The number of position `index` in the stream `seed`.
 inline std::uint64_t seeded_bits(std::uint64_t seed, std::uint64_t index) {

@@ -34,11 +34,14 @@ class MemoryStream final : public Imf::OStream {
 
 }  // namespace
 
-bool has_exr() { return true; }
+bool has_exr() {
+    return true;
+}
 
 std::string exr_bytes(const Image& image, int bits) {
     const glm::ivec2 size = image.size();
-    if (size.x < 1 || size.y < 1) fail("a picture of {} x {} pixels cannot be an EXR", size.x, size.y);
+    if (size.x < 1 || size.y < 1)
+        fail("a picture of {} x {} pixels cannot be an EXR", size.x, size.y);
     // Channels as planes: EXR stores them so.
     const std::size_t pixels = std::size_t(size.x) * std::size_t(size.y);
     const bool depth = image.depth.size() == pixels;
@@ -47,8 +50,10 @@ std::string exr_bytes(const Image& image, int bits) {
     std::vector<char> planes(channels * pixels * bytes);
     auto put = [&](std::size_t channel, std::size_t pixel, float v) {
         char* at = planes.data() + (channel * pixels + pixel) * bytes;
-        if (bits == 16) new (at) Imath::half(v);
-        else new (at) float(v);
+        if (bits == 16)
+            new (at) Imath::half(v);
+        else
+            new (at) float(v);
     };
     for (int y = 0; y < size.y; ++y)
         for (int x = 0; x < size.x; ++x) {
@@ -64,7 +69,8 @@ std::string exr_bytes(const Image& image, int bits) {
     Imf::FrameBuffer frame;
     for (std::size_t k = 0; k < channels; ++k) {
         header.channels().insert(names[k], Imf::Channel(type));
-        frame.insert(names[k], Imf::Slice(type, planes.data() + k * pixels * bytes, bytes, bytes * std::size_t(size.x)));
+        frame.insert(names[k], Imf::Slice(type, planes.data() + k * pixels * bytes, bytes,
+                                          bytes * std::size_t(size.x)));
     }
     MemoryStream stream;
     try {
@@ -83,7 +89,9 @@ std::string exr_bytes(const Image& image, int bits) {
 
 namespace voxloom {
 
-bool has_exr() { return false; }
+bool has_exr() {
+    return false;
+}
 
 std::string exr_bytes(const Image&, int) {
     fail("this build has no OpenEXR; install libopenexr-dev and build again, or write .png");

@@ -27,7 +27,9 @@ using testing::TempFolder;
 struct Png {
     int width = 0, height = 0, bits = 0, channels = 0;
     std::vector<unsigned> samples;
-    unsigned at(int x, int y, int c) const { return samples[std::size_t((y * width + x) * channels + c)]; }
+    unsigned at(int x, int y, int c) const {
+        return samples[std::size_t((y * width + x) * channels + c)];
+    }
 };
 Png read_png(const std::string& bytes) {
     struct Source {
@@ -64,7 +66,8 @@ std::shared_ptr<Image> gradient(glm::ivec2 size) {
     for (int y = 0; y < size.y; ++y)
         for (int x = 0; x < size.x; ++x) {
             float a = float(x + 1) / float(size.x);
-            image->rgba32f()[std::size_t(y * size.x + x)] = {a * 0.25f, a * float(y) / float(size.y), a, a};
+            image->rgba32f()[std::size_t(y * size.x + x)] = {a * 0.25f,
+                                                             a * float(y) / float(size.y), a, a};
         }
     return image;
 }
@@ -99,19 +102,23 @@ TEST(Png, FlatteningLaysThePictureOverTheBackground) {
 }
 
 TEST(Png, ClampsWhatIsOutsideAndTurnsNaNToZero) {
-    constexpr float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN(),
+                    inf = std::numeric_limits<float>::infinity();
     Image image({4, 1}, Image::Format::rgba32f);
     image.rgba32f()[0] = {2, -1, nan, 1};
     image.rgba32f()[1] = {1, 1, 1, nan};
     image.rgba32f()[2] = {inf, 0, 0, 1};
-    image.rgba32f()[3] = {0.5, 0.5, 0.5, 0};  // light without cover cannot be said in straight alpha
+    image.rgba32f()[3] = {0.5, 0.5, 0.5,
+                          0};  // light without cover cannot be said in straight alpha
     Png png = read_png(png_bytes(image));
-    EXPECT_EQ(png.samples, (std::vector<unsigned>{255, 0, 0, 255, 0, 0, 0, 0, 255, 0, 0, 255, 0, 0, 0, 0}));
+    EXPECT_EQ(png.samples,
+              (std::vector<unsigned>{255, 0, 0, 255, 0, 0, 0, 0, 255, 0, 0, 255, 0, 0, 0, 0}));
 }
 
 TEST(Png, OpaqueBytesPassUnchanged) {
     Image image({256, 1}, Image::Format::rgba8);
-    for (int i = 0; i < 256; ++i) image.rgba8()[std::size_t(i)] = glm::u8vec4(i, 255 - i, i / 2, 255);
+    for (int i = 0; i < 256; ++i)
+        image.rgba8()[std::size_t(i)] = glm::u8vec4(i, 255 - i, i / 2, 255);
     Png png = read_png(png_bytes(image));
     for (int i = 0; i < 256; ++i) {
         ASSERT_EQ(png.at(i, 0, 0), unsigned(i));
@@ -143,12 +150,14 @@ TEST(Exr, KeepsPremultipliedFloatsAndDepthExactly) {
     const char* names[] = {"R", "G", "B", "A", "Z"};
     for (std::size_t k = 0; k < 5; ++k) {
         ASSERT_NE(exr.header().channels().findChannel(names[k]), nullptr);
-        frame.insert(names[k], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(planes.data() + 35 * k), 4, 28));
+        frame.insert(names[k], Imf::Slice(Imf::FLOAT,
+                                          reinterpret_cast<char*>(planes.data() + 35 * k), 4, 28));
     }
     exr.setFrameBuffer(frame);
     exr.readPixels(0, 4);
     for (std::size_t i = 0; i < 35; ++i) {
-        for (int k = 0; k < 4; ++k) EXPECT_EQ(planes[35 * std::size_t(k) + i], image->rgba32f()[i][k]);
+        for (int k = 0; k < 4; ++k)
+            EXPECT_EQ(planes[35 * std::size_t(k) + i], image->rgba32f()[i][k]);
         EXPECT_EQ(planes[35 * 4 + i], image->depth[i]);
     }
     EXPECT_LT(exr_bytes(*gradient({64, 64}), 16).size(), exr_bytes(*gradient({64, 64}), 32).size());
@@ -163,7 +172,8 @@ TEST(WriteImage, TakesTheFormatFromTheExtensionAndRefusesWhatItLacks) {
     testing::RunNodeOptions options;
     options.output_folder = folder.path();
     auto write = [&](const std::string& params) {
-        testing::run_node(registry, "writers.image", params, {{"image", {ImagePtr(gradient({4, 4}))}}}, options);
+        testing::run_node(registry, "writers.image", params,
+                          {{"image", {ImagePtr(gradient({4, 4}))}}}, options);
     };
     write("{path: A.PNG, bits: '16', alpha: flatten, background: [1, 1, 1]}");
     std::ifstream in(folder.path() / "A.PNG", std::ios::binary);

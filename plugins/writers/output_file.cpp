@@ -64,7 +64,8 @@ void OutputFile::fail_with_reason(int error) const {
                            ? "free some space or write to another disk"
                        : error == ENOENT ? "make the folder first"
                                          : "choose another folder or change its permissions";
-    fail("{}: cannot be written ({}) after {} bytes; {}", path_.string(), std::strerror(error), size_, mend);
+    fail("{}: cannot be written ({}) after {} bytes; {}", path_.string(), std::strerror(error),
+         size_, mend);
 }
 
 }  // namespace voxloom

@@ -17,7 +17,7 @@ class OutputFile {
     OutputFile(const OutputFile&) = delete;
     OutputFile& operator=(const OutputFile&) = delete;
 
-    void write(std::span<const std::byte> bytes);     // throws Error: disk full, quota, ...
+    void write(std::span<const std::byte> bytes);  // throws Error: disk full, quota, ...
     void write(std::string_view text) { write(std::as_bytes(std::span(text.data(), text.size()))); }
     std::uint64_t size() const { return size_; }
     // Closes and gives the file its name, replacing what was there.

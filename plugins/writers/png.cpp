@@ -46,8 +46,8 @@ bool encode(PngTarget& target, glm::ivec2 size, int bits, int color_type, png_by
     }
     png_set_user_limits(png, 0x7fffffff, 0x7fffffff);
     png_set_write_fn(png, &target, append, nullptr);
-    png_set_IHDR(png, info, png_uint_32(size.x), png_uint_32(size.y), bits, color_type, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_set_IHDR(png, info, png_uint_32(size.x), png_uint_32(size.y), bits, color_type,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
     png_write_info(png, info);
     png_write_image(png, rows);
@@ -61,7 +61,8 @@ glm::dvec4 straight(glm::dvec4 c, const PngOptions& options) {
     for (int i = 0; i < 4; ++i)
         if (std::isnan(c[i])) c[i] = 0;
     const double alpha = glm::clamp(c.a, 0.0, 1.0);
-    if (options.opaque) return {glm::clamp(glm::dvec3(c) + (1 - alpha) * options.background, 0.0, 1.0), 1.0};
+    if (options.opaque)
+        return {glm::clamp(glm::dvec3(c) + (1 - alpha) * options.background, 0.0, 1.0), 1.0};
     if (alpha <= 0) return glm::dvec4(0.0);
     return {glm::clamp(glm::dvec3(c) / alpha, 0.0, 1.0), alpha};
 }
@@ -70,8 +71,10 @@ glm::dvec4 straight(glm::dvec4 c, const PngOptions& options) {
 
 std::string png_bytes(const Image& image, const PngOptions& options) {
     const glm::ivec2 size = image.size();
-    if (size.x < 1 || size.y < 1) fail("a picture of {} x {} pixels cannot be a PNG", size.x, size.y);
-    const std::size_t channels = options.opaque ? 3 : 4, width = std::size_t(size.x) * channels * std::size_t(options.bits / 8);
+    if (size.x < 1 || size.y < 1)
+        fail("a picture of {} x {} pixels cannot be a PNG", size.x, size.y);
+    const std::size_t channels = options.opaque ? 3 : 4,
+                      width = std::size_t(size.x) * channels * std::size_t(options.bits / 8);
     std::vector<png_byte> pixels(width * std::size_t(size.y));
     std::vector<png_bytep> rows;
     png_byte* out = pixels.data();
@@ -88,7 +91,8 @@ std::string png_bytes(const Image& image, const PngOptions& options) {
         }
     }
     PngTarget target;
-    if (!encode(target, size, options.bits, options.opaque ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGBA, rows.data()))
+    if (!encode(target, size, options.bits,
+                options.opaque ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGBA, rows.data()))
         fail("libpng: {}", target.message[0] ? target.message : "out of memory");
     return std::move(target.bytes);
 }

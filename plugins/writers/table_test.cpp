@@ -17,9 +17,10 @@ Table sample() {
     constexpr double inf = std::numeric_limits<double>::infinity();
     Table table;
     table.columns = {{"codec, coder", ""}, {"time", "s"}, {"bricks", ""}};
-    table.rows = {{std::string("paper \"fast\""), 0.1, std::int64_t(9007199254740993)},
-                  {std::string("two\nlines"), std::numeric_limits<double>::quiet_NaN(), std::int64_t(-1)},
-                  {std::string(), -inf, std::int64_t(0)}};
+    table.rows = {
+        {std::string("paper \"fast\""), 0.1, std::int64_t(9007199254740993)},
+        {std::string("two\nlines"), std::numeric_limits<double>::quiet_NaN(), std::int64_t(-1)},
+        {std::string(), -inf, std::int64_t(0)}};
     return table;
 }
 
@@ -65,7 +66,8 @@ TEST(WriteTable, TakesTheFormatFromTheExtension) {
     options.output_folder = folder.path();
     const TablePtr table = std::make_shared<const Table>(sample());
     auto text = [&](const std::string& name) {
-        testing::run_node(registry, "writers.table", "{path: " + name + "}", {{"table", {table}}}, options);
+        testing::run_node(registry, "writers.table", "{path: " + name + "}", {{"table", {table}}},
+                          options);
         std::ifstream in(folder.path() / name, std::ios::binary);
         return std::string(std::istreambuf_iterator<char>(in), {});
     };

@@ -49,7 +49,9 @@ std::string to_csv(const Table& table) {
     std::string text;
     for (std::size_t c = 0; c < table.columns.size(); ++c) {
         const Table::Column& column = table.columns[c];
-        text += (c ? "," : "") + csv_field(column.unit.empty() ? column.name : column.name + " [" + column.unit + "]");
+        text +=
+            (c ? "," : "") +
+            csv_field(column.unit.empty() ? column.name : column.name + " [" + column.unit + "]");
     }
     text += "\r\n";
     for (const auto& row : table.rows) {

@@ -11,8 +11,8 @@ namespace voxloom {
 // Numbers in their shortest exact form whatever the locale; nan, inf and -inf as these words.
 std::string to_csv(const Table& table);
 
-// {"columns": [{"name": ..., "unit": ...}], "rows": [[...], ...]}, a row a line. JSON has no NaN and
-// no infinities: NaN is null, infinities are the texts "inf" and "-inf".
+// {"columns": [{"name": ..., "unit": ...}], "rows": [[...], ...]}, a row a line. JSON has no NaN
+// and no infinities: NaN is null, infinities are the texts "inf" and "-inf".
 std::string to_json(const Table& table);
 
 }  // namespace voxloom

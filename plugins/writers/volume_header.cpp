@@ -14,22 +14,29 @@ namespace {
 constexpr bool kBigEndian = std::endian::native == std::endian::big;
 
 // "a b c": shortest exact numbers, whatever the locale.
-std::string words(glm::dvec3 v) { return shortest(v.x) + " " + shortest(v.y) + " " + shortest(v.z); }
+std::string words(glm::dvec3 v) {
+    return shortest(v.x) + " " + shortest(v.y) + " " + shortest(v.z);
+}
 std::string vector(glm::dvec3 v) {
     return "(" + shortest(v.x) + "," + shortest(v.y) + "," + shortest(v.z) + ")";
 }
-std::string list(glm::dvec3 v) { return "[" + shortest(v.x) + ", " + shortest(v.y) + ", " + shortest(v.z) + "]"; }
+std::string list(glm::dvec3 v) {
+    return "[" + shortest(v.x) + ", " + shortest(v.y) + ", " + shortest(v.z) + "]";
+}
 std::string sizes(Index3 n) {
     return std::to_string(n.x) + " " + std::to_string(n.y) + " " + std::to_string(n.z);
 }
 
 // A header is made of lines: what would end one becomes a blank.
 std::string one_line(std::string text) {
-    std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+    std::replace_if(
+        text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
     return text;
 }
 
-glm::dvec3 axis(const VolumeDesc& desc, int a) { return glm::dvec3(desc.index_to_world[a]); }
+glm::dvec3 axis(const VolumeDesc& desc, int a) {
+    return glm::dvec3(desc.index_to_world[a]);
+}
 
 // Unit vector along an axis; the axis itself where it has no length.
 glm::dvec3 direction(const VolumeDesc& desc, int a) {
@@ -53,7 +60,8 @@ std::optional<VolumeFormat> volume_format_of(const std::filesystem::path& path) 
 
 // teem.sourceforge.net/nrrd/format.html
 std::string nrrd_header(const VolumeDesc& desc, bool gzip, const std::string& data_file) {
-    constexpr const char* types[] = {"uint8", "int8", "uint16", "int16", "uint32", "int32", "float", "double"};
+    constexpr const char* types[] = {"uint8",  "int8",  "uint16", "int16",
+                                     "uint32", "int32", "float",  "double"};
     const bool several = desc.components > 1;
     std::string text = "NRRD0005\n# written by voxloom\n";
     auto line = [&](const char* field, const std::string& value) {
@@ -66,8 +74,8 @@ std::string nrrd_header(const VolumeDesc& desc, bool gzip, const std::string& da
     line("sizes", (several ? std::to_string(desc.components) + " " : "") + sizes(desc.dims));
     line("space directions", std::string(several ? "none " : "") + vector(axis(desc, 0)) + " " +
                                  vector(axis(desc, 1)) + " " + vector(axis(desc, 2)));
-    const char* kind = !several        ? ""
-                       : !desc.color   ? "vector "
+    const char* kind = !several               ? ""
+                       : !desc.color          ? "vector "
                        : desc.components == 4 ? "RGBA-color "
                                               : "RGB-color ";
     line("kinds", std::string(kind) + "domain domain domain");
@@ -80,7 +88,8 @@ std::string nrrd_header(const VolumeDesc& desc, bool gzip, const std::string& da
     line("encoding", gzip ? "gzip" : "raw");
     if (bytes_of(desc.type) > 1) line("endian", kBigEndian ? "big" : "little");
     if (!data_file.empty()) line("data file", data_file);
-    if (desc.significant_bits > 0) text += "significant_bits:=" + std::to_string(desc.significant_bits) + "\n";
+    if (desc.significant_bits > 0)
+        text += "significant_bits:=" + std::to_string(desc.significant_bits) + "\n";
     return text + "\n";
 }
 

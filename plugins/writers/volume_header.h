@@ -12,11 +12,11 @@ namespace voxloom {
 
 // What the extension of a path asks for, or nothing when it is none of ours.
 enum class VolumeFormat {
-    nrrd,       // .nrrd: header and voxels in one file
-    nhdr,       // .nhdr: the header, and NAME.raw or NAME.raw.gz
-    mha,        // .mha: header and voxels in one file
-    mhd,        // .mhd: the header, and NAME.raw
-    raw,        // .raw: the voxels, and NAME.raw.yaml that describes them
+    nrrd,  // .nrrd: header and voxels in one file
+    nhdr,  // .nhdr: the header, and NAME.raw or NAME.raw.gz
+    mha,   // .mha: header and voxels in one file
+    mhd,   // .mhd: the header, and NAME.raw
+    raw,   // .raw: the voxels, and NAME.raw.yaml that describes them
 };
 std::optional<VolumeFormat> volume_format_of(const std::filesystem::path& path);
 inline constexpr const char* kVolumeExtensions = ".nrrd, .nhdr, .mha, .mhd, .raw";

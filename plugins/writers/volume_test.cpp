@@ -2,8 +2,10 @@
 #include <sys/resource.h>
 #include <zlib.h>
 
-#include <csignal>
+#include <algorithm>
 #include <cmath>
+#include <csignal>
+#include <cstring>
 #include <fstream>
 #include <limits>
 
@@ -29,7 +31,8 @@ const Registry& writers() {
     return registry;
 }
 
-NodeRun write(VolumePtr volume, const fs::path& folder, const std::string& params, std::stop_token stop = {}) {
+NodeRun write(VolumePtr volume, const fs::path& folder, const std::string& params,
+              std::stop_token stop = {}) {
     testing::RunNodeOptions options;
     options.output_folder = folder;
     options.stop = std::move(stop);
@@ -44,13 +47,15 @@ std::string content(const fs::path& file) {
 
 std::vector<std::string> names_in(const fs::path& folder) {
     std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+    for (const auto& entry : fs::directory_iterator(folder))
+        names.push_back(entry.path().filename().string());
     std::sort(names.begin(), names.end());
     return names;
 }
 
 VolumePtr ramp(Index3 dims, ScalarType type) {
-    return testing::make_volume(dims, type, [](auto x, auto y, auto z) { return double(x + 3 * y - 7 * z); });
+    return testing::make_volume(dims, type,
+                                [](auto x, auto y, auto z) { return double(x + 3 * y - 7 * z); });
 }
 
 TEST(WriteVolume, ANrrdIsItsHeaderAndItsVoxels) {
@@ -62,8 +67,10 @@ TEST(WriteVolume, ANrrdIsItsHeaderAndItsVoxels) {
     const std::size_t end = text.find("\n\n");
     ASSERT_NE(end, std::string::npos);
     EXPECT_EQ(text.substr(0, end),
-              "NRRD0005\n# written by voxloom\ntype: int16\ndimension: 3\nspace dimension: 3\nsizes: 3 2 2\n"
-              "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nspace origin: (0,0,0)\n"
+              "NRRD0005\n# written by voxloom\ntype: int16\ndimension: 3\nspace dimension: "
+              "3\nsizes: 3 2 2\n"
+              "space directions: (1,0,0) (0,1,0) (0,0,1)\nkinds: domain domain domain\nspace "
+              "origin: (0,0,0)\n"
               "encoding: raw\nendian: little");
     EXPECT_EQ(text.substr(end + 2), std::string(reinterpret_cast<const char*>(volume->data()), 24));
 }
@@ -79,21 +86,25 @@ TEST(WriteVolume, HeadersKeepTheWholeDescription) {
     desc.significant_bits = 12;
     desc.index_to_world = glm::dmat4(0, 0.1, 0, 0, -2, 0, 0, 0, 0, 0, 3, 0, 7, 8.5, -9, 1);
     const std::string nrrd = nrrd_header(desc, true, "x.raw.gz");
-    for (const char* line : {"\ndimension: 4\n", "\nsizes: 3 5 4 3\n", "\ncontent: two lines\n",
-                             "\nspace directions: none (0,0.1,0) (-2,0,0) (0,0,3)\n",
-                             "\nkinds: RGB-color domain domain domain\n", "\nspace units: \"mm\" \"mm\" \"mm\"\n",
-                             "\nspace origin: (7,8.5,-9)\n", "\nencoding: gzip\n", "\ndata file: x.raw.gz\n",
-                             "\nsignificant_bits:=12\n"})
+    for (const char* line :
+         {"\ndimension: 4\n", "\nsizes: 3 5 4 3\n", "\ncontent: two lines\n",
+          "\nspace directions: none (0,0.1,0) (-2,0,0) (0,0,3)\n",
+          "\nkinds: RGB-color domain domain domain\n", "\nspace units: \"mm\" \"mm\" \"mm\"\n",
+          "\nspace origin: (7,8.5,-9)\n", "\nencoding: gzip\n", "\ndata file: x.raw.gz\n",
+          "\nsignificant_bits:=12\n"})
         EXPECT_NE(nrrd.find(line), std::string::npos) << line;
     const std::string meta = meta_header(desc, "");
-    for (const char* line : {"\nTransformMatrix = 0 1 0 -1 0 0 0 0 1\n", "\nElementSpacing = 0.1 2 3\n",
-                             "\nOffset = 7 8.5 -9\n", "\nElementNumberOfChannels = 3\n", "\nElementType = MET_USHORT\n",
-                             "\nDimSize = 5 4 3\n", "\nElementDataFile = LOCAL\n"})
+    for (const char* line :
+         {"\nTransformMatrix = 0 1 0 -1 0 0 0 0 1\n", "\nElementSpacing = 0.1 2 3\n",
+          "\nOffset = 7 8.5 -9\n", "\nElementNumberOfChannels = 3\n",
+          "\nElementType = MET_USHORT\n", "\nDimSize = 5 4 3\n", "\nElementDataFile = LOCAL\n"})
         EXPECT_NE(meta.find(line), std::string::npos) << line;
     const std::string raw = raw_sidecar(desc, true);
-    for (const char* line : {"\ndims: [5, 4, 3]\n", "\ntype: u16\n", "\ncomponents: 3\n", "\ncolor: true\n",
-                             "\nspacing: [0.1, 2, 3]\n", "\norigin: [7, 8.5, -9]\n", "\ndirection: [0, 1, 0, -1, 0, 0, 0, 0, 1]\n",
-                             "\nunit: mm\n", "\nname: \"two\\x0alines\"\n", "\nsignificant_bits: 12\n", "\ncompression: gzip\n"})
+    for (const char* line :
+         {"\ndims: [5, 4, 3]\n", "\ntype: u16\n", "\ncomponents: 3\n", "\ncolor: true\n",
+          "\nspacing: [0.1, 2, 3]\n", "\norigin: [7, 8.5, -9]\n",
+          "\ndirection: [0, 1, 0, -1, 0, 0, 0, 0, 1]\n", "\nunit: mm\n",
+          "\nname: \"two\\x0alines\"\n", "\nsignificant_bits: 12\n", "\ncompression: gzip\n"})
         EXPECT_NE(raw.find(line), std::string::npos) << line;
 }
 
@@ -101,10 +112,13 @@ TEST(WriteVolume, DetachedFormatsAreTwoFilesThatNameEachOther) {
     TempFolder folder;
     VolumePtr volume = ramp({4, 3, 2}, ScalarType::u8);
     write(volume, folder.path(), "{path: deep/er/v.ct.nhdr}");
-    EXPECT_EQ(names_in(folder.path() / "deep/er"), (std::vector<std::string>{"v.ct.nhdr", "v.ct.raw"}));
-    EXPECT_NE(content(folder.path() / "deep/er/v.ct.nhdr").find("data file: v.ct.raw\n"), std::string::npos);
+    EXPECT_EQ(names_in(folder.path() / "deep/er"),
+              (std::vector<std::string>{"v.ct.nhdr", "v.ct.raw"}));
+    EXPECT_NE(content(folder.path() / "deep/er/v.ct.nhdr").find("data file: v.ct.raw\n"),
+              std::string::npos);
     write(volume, folder.path(), "{path: b.mhd}");
-    EXPECT_NE(content(folder.path() / "b.mhd").find("ElementDataFile = b.raw\n"), std::string::npos);
+    EXPECT_NE(content(folder.path() / "b.mhd").find("ElementDataFile = b.raw\n"),
+              std::string::npos);
     write(volume, folder.path(), "{path: c.raw}");
     EXPECT_EQ(content(folder.path() / "c.raw"), content(folder.path() / "b.raw"));
     EXPECT_EQ(content(folder.path() / "c.raw").size(), 24u);
@@ -156,7 +170,8 @@ VolumeDesc desc_of(Index3 dims) {
 }
 
 TEST(WriteVolume, SlabsAreBoundedInMemoryAndCoverTheFileInOrder) {
-    for (Index3 dims : {Index3(40000001, 1, 1), Index3(6000, 5000, 2), Index3(500, 400, 300), Index3(1, 1, 17)}) {
+    for (Index3 dims :
+         {Index3(40000001, 1, 1), Index3(6000, 5000, 2), Index3(500, 400, 300), Index3(1, 1, 17)}) {
         TempFolder folder;
         auto volume = std::make_shared<Streamed>(desc_of(dims));
         write(volume, folder.path(), "{path: big.raw}");
@@ -177,7 +192,8 @@ TEST(WriteVolume, CancelLeavesNothingBehindAndTheOldFileWhole) {
     auto volume = std::make_shared<Streamed>(desc_of({6000, 5000, 4}));
     volume->stop_after_ = 3;
     std::ofstream(folder.path() / "v.nrrd") << "old";
-    EXPECT_THROW(write(volume, folder.path(), "{path: v.nrrd}", volume->stop_.get_token()), Cancelled);
+    EXPECT_THROW(write(volume, folder.path(), "{path: v.nrrd}", volume->stop_.get_token()),
+                 Cancelled);
     EXPECT_EQ(volume->reads_, 3);
     EXPECT_EQ(names_in(folder.path()), std::vector<std::string>{"v.nrrd"});
     EXPECT_EQ(content(folder.path() / "v.nrrd"), "old");
@@ -222,8 +238,10 @@ TEST(WriteVolume, AMaskBecomesNaNInFloatsAndAWarningInIntegers) {
     for (std::size_t i = 0; i < 7; ++i) {
         float v;
         std::memcpy(&v, bytes.data() + 4 * i, 4);
-        if (i == 4) EXPECT_TRUE(std::isnan(v));
-        else EXPECT_EQ(v, 2.5f);
+        if (i == 4)
+            EXPECT_TRUE(std::isnan(v));
+        else
+            EXPECT_EQ(v, 2.5f);
     }
 }
 
@@ -239,11 +257,13 @@ TEST(WriteVolume, WhatCannotBeWrittenIsRefusedWithItsMend) {
     };
     VolumePtr one = ramp({1, 1, 1}, ScalarType::f64), none = ramp({0, 3, 3}, ScalarType::u8);
     EXPECT_NE(message(one, "{path: a.jpg}").find(".nrrd, .nhdr"), std::string::npos);
-    EXPECT_NE(message(one, "{path: a.mha, compression: gzip}").find("without compression"), std::string::npos);
+    EXPECT_NE(message(one, "{path: a.mha, compression: gzip}").find("without compression"),
+              std::string::npos);
     EXPECT_NE(message(none, "{path: a.nrrd}").find("only be written as .raw"), std::string::npos);
     fs::create_directory(folder.path() / "d.nrrd");
     EXPECT_NE(message(one, "{path: d.nrrd}").find("it is a folder"), std::string::npos);
-    EXPECT_NE(message(one, "{path: /proc/nowhere/a.nrrd}").find("cannot be written"), std::string::npos);
+    EXPECT_NE(message(one, "{path: /proc/nowhere/a.nrrd}").find("cannot be written"),
+              std::string::npos);
     EXPECT_EQ(message(none, "{path: none.raw}"), "");
     EXPECT_EQ(fs::file_size(folder.path() / "none.raw"), 0u);
     EXPECT_EQ(message(one, "{path: one.nhdr}"), "");

@@ -15,17 +15,20 @@ void add_table_writer(Registry& registry) {
     type.doc = "Writes a table of measurements as CSV or JSON.";
     type.keywords = {"save", "export", "file", "csv", "json", "measurements", "report"};
     type.inputs = {{"table", PortType::table, "The table to write."}};
-    type.params = {param::path_out("path", "table.csv", "The file; its extension is the format: .csv or .json.")};
+    type.params = {param::path_out("path", "table.csv",
+                                   "The file; its extension is the format: .csv or .json.")};
     type.writes_files = true;
     type.cacheable = false;
-    type.method = R"(CSV as RFC 4180 has it, units in the header (`time [s]`), numbers in their shortest exact form
+    type.method =
+        R"(CSV as RFC 4180 has it, units in the header (`time [s]`), numbers in their shortest exact form
 whatever the locale, `nan`, `inf` and `-inf` as these words. JSON holds the columns with their units
 and the rows as lists; NaN is `null`, infinities are texts.)";
     type.describe = [](Description& d) {
         const std::filesystem::path path = d.params().path("path");
         const std::string extension = extension_of(path);
         if (extension != ".csv" && extension != ".json")
-            d.problem(fmt::format("'{}' has none of the extensions .csv and .json", path.string()), "path");
+            d.problem(fmt::format("'{}' has none of the extensions .csv and .json", path.string()),
+                      "path");
     };
     type.evaluate = [](Evaluation& e) {
         const TablePtr table = e.input<Table>("table");

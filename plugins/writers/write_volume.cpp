@@ -39,7 +39,8 @@ class Sink {
     void write(std::span<const std::byte> bytes) {
         if (!gzip_) return file_.write(bytes);
         constexpr std::size_t most = std::size_t(1) << 30;  // zlib counts in unsigned int
-        for (; bytes.size() > most; bytes = bytes.subspan(most)) deflate_all(bytes.first(most), Z_NO_FLUSH);
+        for (; bytes.size() > most; bytes = bytes.subspan(most))
+            deflate_all(bytes.first(most), Z_NO_FLUSH);
         deflate_all(bytes, Z_NO_FLUSH);
     }
     void finish() {
@@ -71,7 +72,8 @@ template <class F>
 void for_each_slab(const VolumeDesc& desc, const F& f) {
     if (desc.voxels() == 0) return;
     const Index3 n = desc.dims;
-    const std::int64_t most = std::max<std::int64_t>(1, std::int64_t(kSlabBytes / desc.voxel_bytes()));
+    const std::int64_t most =
+        std::max<std::int64_t>(1, std::int64_t(kSlabBytes / desc.voxel_bytes()));
     const std::int64_t row = n.x, slice = n.x * n.y;
     const Index3 step = most >= slice ? Index3(n.x, n.y, most / slice)
                         : most >= row ? Index3(n.x, most / row, 1)
@@ -92,7 +94,9 @@ void erase_invalid(const Volume& volume, const Box& box, std::span<std::byte> vo
         if constexpr (std::is_floating_point_v<T>) {
             T* out = reinterpret_cast<T*>(voxels.data());
             for (std::size_t i = 0; i < valid.size(); ++i)
-                if (!valid[i]) std::fill_n(out + i * components, components, std::numeric_limits<T>::quiet_NaN());
+                if (!valid[i])
+                    std::fill_n(out + i * components, components,
+                                std::numeric_limits<T>::quiet_NaN());
         }
     });
 }
@@ -101,7 +105,9 @@ void write_voxels(const Volume& volume, Sink& sink, Evaluation& e) {
     const VolumeDesc& desc = volume.desc();
     const bool erase = desc.has_mask && is_float(desc.type);
     const double all = double(std::max<std::uint64_t>(desc.voxels(), 1));
-    Buffer slab(std::min(desc.dense_bytes(), std::max<std::uint64_t>(kSlabBytes, desc.voxel_bytes())), "slab to write");
+    Buffer slab(
+        std::min(desc.dense_bytes(), std::max<std::uint64_t>(kSlabBytes, desc.voxel_bytes())),
+        "slab to write");
     double done = 0;
     for_each_slab(desc, [&](const Box& box) {
         check_stop(e.stop());
@@ -123,12 +129,18 @@ Refusal refusal_of(const Params& params, const VolumeDesc* desc) {
     const fs::path path = params.path("path");
     const auto format = volume_format_of(path);
     if (!format)
-        return {fmt::format("'{}' has none of the extensions {}", path.string(), kVolumeExtensions), "path"};
-    if (params.text("compression") == "gzip" && (*format == VolumeFormat::mha || *format == VolumeFormat::mhd))
-        return {"MetaImage files are written without compression; write .nrrd, .nhdr or .raw to have gzip",
-                "compression"};
+        return {fmt::format("'{}' has none of the extensions {}", path.string(), kVolumeExtensions),
+                "path"};
+    if (params.text("compression") == "gzip" &&
+        (*format == VolumeFormat::mha || *format == VolumeFormat::mhd))
+        return {
+            "MetaImage files are written without compression; write .nrrd, .nhdr or .raw to have "
+            "gzip",
+            "compression"};
     if (desc && desc->voxels() == 0 && *format != VolumeFormat::raw)
-        return {"a volume without voxels can only be written as .raw; the other formats know no size 0", "path"};
+        return {
+            "a volume without voxels can only be written as .raw; the other formats know no size 0",
+            "path"};
     return {};
 }
 
@@ -140,7 +152,9 @@ void write_volume(Evaluation& e) {
     const VolumeFormat format = *volume_format_of(path);
     const bool gzip = e.params().text("compression") == "gzip";
     if (desc.has_mask && !is_float(desc.type))
-        e.warn("the validity mask is not kept: the voxels are integers, which have no NaN to say it with");
+        e.warn(
+            "the validity mask is not kept: the voxels are integers, which have no NaN to say it "
+            "with");
     // Else every slab would cost a reading of everything.
     if (!volume->reads_by_region()) volume = in_memory(volume, e.stop());
 
@@ -171,7 +185,8 @@ void write_volume(Evaluation& e) {
         data.commit();
     }
     e.measure("file size", double(bytes), "B");
-    if (desc.dense_bytes() > 0 && gzip) e.measure("ratio", double(desc.dense_bytes()) / double(bytes));
+    if (desc.dense_bytes() > 0 && gzip)
+        e.measure("ratio", double(desc.dense_bytes()) / double(bytes));
 }
 
 void describe_writing(Description& d) {
@@ -188,17 +203,23 @@ void add_volume_writer(Registry& registry) {
     type.id = "writers.volume";
     type.title = "Write volume";
     type.doc = "Writes a volume as NRRD, MetaImage or raw, slab by slab.";
-    type.keywords = {"save", "export", "file", "nrrd", "nhdr", "mha", "mhd", "metaimage", "raw", "gzip"};
+    type.keywords = {"save", "export", "file",      "nrrd", "nhdr",
+                     "mha",  "mhd",    "metaimage", "raw",  "gzip"};
     type.inputs = {{"volume", PortType::volume, "The volume to write."}};
     type.params = {
-        param::path_out("path", "volume.nrrd", "The file; its extension is the format: .nrrd, .nhdr, .mha, .mhd or .raw."),
-        param::choice("compression", {"none", "gzip"}, "none", "How the voxels are packed (not in MetaImage)."),
+        param::path_out("path", "volume.nrrd",
+                        "The file; its extension is the format: .nrrd, .nhdr, .mha, .mhd or .raw."),
+        param::choice("compression", {"none", "gzip"}, "none",
+                      "How the voxels are packed (not in MetaImage)."),
         param::integer("level", 6, "Effort of gzip: 1 is fast, 9 is small.")
-            .range(1, 9).slider(1, 9).shown_if("compression", {"gzip"}),
+            .range(1, 9)
+            .slider(1, 9)
+            .shown_if("compression", {"gzip"}),
     };
     type.writes_files = true;
     type.cacheable = false;
-    type.method = R"(The volume is read in slabs of 16 MiB and appended to the file, so that memory stays bounded whatever
+    type.method =
+        R"(The volume is read in slabs of 16 MiB and appended to the file, so that memory stays bounded whatever
 its size; the file has a temporary name until it is whole. Dims, scalar type, components, spacing,
 origin and all three axis directions are kept; NRRD and raw keep unit, name and significant bits too.
 A validity mask becomes NaN in float types.

@@ -1,7 +1,9 @@
 // Every node of every built plugin, by what its description says, without a line about any of them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <fstream>
 #include <set>
 
@@ -22,7 +24,9 @@ using testing::NodeRun;
 using testing::sample_value;
 using testing::TempFolder;
 
-bool is_sentence(const std::string& s) { return s.size() > 3 && (s.back() == '.' || s.back() == ')'); }
+bool is_sentence(const std::string& s) {
+    return s.size() > 3 && (s.back() == '.' || s.back() == ')');
+}
 
 // Drawing nodes run where there is OpenGL; Mesa is not instrumented for sanitizers.
 bool can_run(const NodeType& type) {
@@ -46,7 +50,8 @@ std::vector<PortType> all_of(PortTypes types) {
 // Defaults, but for the size of pictures: what is tested here does not depend on it.
 Params small_params(const NodeType& type) {
     Params params(type.params, VOXLOOM_SOURCE_DIR);
-    if (const ParamSpec* size = type.find_param("size"); size && size->kind == ParamKind::vector && size->length == 2)
+    if (const ParamSpec* size = type.find_param("size");
+        size && size->kind == ParamKind::vector && size->length == 2)
         params.set("size", std::vector<double>{24, 17});
     return params;
 }
@@ -67,11 +72,13 @@ NodeInputs inputs_for(const NodeType& type, Index3 dims, bool optional, PortType
 // Each way to wire a node: with and without its optional inputs, with each type of its first input.
 template <class F>
 void for_each_wiring(const NodeType& type, Index3 dims, const F& f) {
-    const std::vector<PortType> picks =
-        type.inputs.empty() ? std::vector<PortType>{PortType::volume} : all_of(type.inputs.front().types);
+    const std::vector<PortType> picks = type.inputs.empty()
+                                            ? std::vector<PortType>{PortType::volume}
+                                            : all_of(type.inputs.front().types);
     for (PortType pick : picks)
         for (bool optional : {false, true}) {
-            SCOPED_TRACE(std::string(name_of(pick)) + (optional ? ", every input" : ", required inputs"));
+            SCOPED_TRACE(std::string(name_of(pick)) +
+                         (optional ? ", every input" : ", required inputs"));
             f(inputs_for(type, dims, optional, pick));
         }
 }
@@ -90,11 +97,13 @@ Outcome outcome_of(const NodeType& type, const NodeInputs& inputs) {
     Outcome outcome;
     try {
         NodeRun run = testing::run_node(type, small_params(type), inputs, options);
-        for (const auto& [port, value] : run.outputs) outcome.outputs[port] = testing::bytes_of_value(value);
+        for (const auto& [port, value] : run.outputs)
+            outcome.outputs[port] = testing::bytes_of_value(value);
     } catch (const Error& e) {
         outcome.error = e.what();
         // A sentence names the place; only the folder's name differs from run to run.
-        for (std::size_t at; (at = outcome.error.find(folder.path().string())) != std::string::npos;)
+        for (std::size_t at;
+             (at = outcome.error.find(folder.path().string())) != std::string::npos;)
             outcome.error.erase(at, folder.path().string().size());
         EXPECT_GT(outcome.error.size(), 15u) << outcome.error;
     }
@@ -104,7 +113,8 @@ Outcome outcome_of(const NodeType& type, const NodeInputs& inputs) {
         std::ifstream in(entry.path(), std::ios::binary);
         const std::string content(std::istreambuf_iterator<char>(in), {});
         auto bytes = std::as_bytes(std::span(content));
-        outcome.outputs["file " + entry.path().filename().string()].assign(bytes.begin(), bytes.end());
+        outcome.outputs["file " + entry.path().filename().string()].assign(bytes.begin(),
+                                                                           bytes.end());
     }
     return outcome;
 }
@@ -125,7 +135,8 @@ TEST(RegistrySweep, EveryNodeSaysWhatItIs) {
         EXPECT_FALSE(type->keywords.empty());
         EXPECT_GT(type->method.size(), 80u) << "no words on method, use and limits";
         for (const auto* ports : {&type->inputs, &type->outputs})
-            for (const PortSpec& port : *ports) EXPECT_TRUE(is_sentence(port.doc)) << port.key << ": " << port.doc;
+            for (const PortSpec& port : *ports)
+                EXPECT_TRUE(is_sentence(port.doc)) << port.key << ": " << port.doc;
         EXPECT_TRUE(type->writes_files || !type->outputs.empty()) << "it has no effect";
     }
 }
@@ -143,7 +154,8 @@ TEST(RegistrySweep, EveryParameterIsDescribedAndItsRangesHoldTogether) {
             }
             if (spec.kind == ParamKind::choice) {
                 EXPECT_GE(spec.choices.size(), 2u);
-                EXPECT_EQ(std::set<std::string>(spec.choices.begin(), spec.choices.end()).size(), spec.choices.size());
+                EXPECT_EQ(std::set<std::string>(spec.choices.begin(), spec.choices.end()).size(),
+                          spec.choices.size());
             }
             if (!spec.shown_if_key.empty()) {
                 const ParamSpec* other = type->find_param(spec.shown_if_key);
@@ -151,7 +163,9 @@ TEST(RegistrySweep, EveryParameterIsDescribedAndItsRangesHoldTogether) {
                 EXPECT_FALSE(spec.shown_if_values.empty());
                 if (other->kind != ParamKind::choice) continue;
                 for (const std::string& v : spec.shown_if_values)
-                    EXPECT_NE(std::find(other->choices.begin(), other->choices.end(), v), other->choices.end()) << v;
+                    EXPECT_NE(std::find(other->choices.begin(), other->choices.end(), v),
+                              other->choices.end())
+                        << v;
             }
         }
 }
@@ -166,7 +180,8 @@ TEST(RegistrySweep, ParametersSurviveTheGraphsText) {
             if (spec.kind == ParamKind::real)
                 for (double v : {spec.min, spec.max, 1.0 / 3})
                     if (std::isfinite(v) && v >= spec.min && v <= spec.max) values.emplace_back(v);
-            if (spec.kind == ParamKind::text) values.emplace_back(std::string("a 'quoted' \"text\": # not a comment, [1]"));
+            if (spec.kind == ParamKind::text)
+                values.emplace_back(std::string("a 'quoted' \"text\": # not a comment, [1]"));
             for (const ParamValue& value : values) {
                 const std::string yaml = "{" + spec.key + ": " + to_yaml(value) + "}";
                 EXPECT_EQ(testing::params_from_yaml(*type, yaml).value(spec.key), value) << yaml;
@@ -182,7 +197,9 @@ Registry with_sources() {
         source.id = "test.source" + std::to_string(t);
         source.title = source.doc = "Source.";
         source.outputs = {{"out", PortType(t), "A value."}};
-        source.evaluate = [t](Evaluation& e) { e.output("out", sample_value(PortType(t), {4, 4, 4})); };
+        source.evaluate = [t](Evaluation& e) {
+            e.output("out", sample_value(PortType(t), {4, 4, 4}));
+        };
         registry.add(source);
     }
     return registry;
@@ -194,13 +211,15 @@ TEST(RegistrySweep, AWireOfAWrongTypeIsRefusedWithBothTypesNamed) {
         for (const PortSpec& port : type->inputs)
             for (int t = 0; t < kPortTypes; ++t) {
                 const Document document = Document::parse(
-                    "voxloom: 1\nnodes:\n  - {id: s, type: test.source" + std::to_string(t) + "}\n  - {id: n, type: " +
-                    type->id + ", in: {" + port.key + ": s.out}}\n");
+                    "voxloom: 1\nnodes:\n  - {id: s, type: test.source" + std::to_string(t) +
+                    "}\n  - {id: n, type: " + type->id + ", in: {" + port.key + ": s.out}}\n");
                 const Plan plan = check(document.graph(), registry);
                 std::string message;
                 for (const Problem& problem : plan.problems)
-                    if (problem.node == "n" && problem.where == port.key) message += problem.message;
-                SCOPED_TRACE(type->id + "." + port.key + " <- " + std::string(name_of(PortType(t))) + ": " + message);
+                    if (problem.node == "n" && problem.where == port.key)
+                        message += problem.message;
+                SCOPED_TRACE(type->id + "." + port.key + " <- " +
+                             std::string(name_of(PortType(t))) + ": " + message);
                 if (port.types.has(PortType(t))) continue;
                 EXPECT_NE(message.find(name_of(PortType(t))), std::string::npos);
                 EXPECT_NE(message.find(port.types.text()), std::string::npos);
@@ -211,9 +230,12 @@ TEST(RegistrySweep, AWireOfAWrongTypeIsRefusedWithBothTypesNamed) {
 TEST(RegistrySweep, VolumesOfNoAndOfOneVoxelGiveAResultOrAClearError) {
     for (const NodeType* type : built_plugins().all()) {
         if (!can_run(*type)) continue;
-        for (Index3 dims : {Index3(0, 0, 0), Index3(5, 0, 3), Index3(1, 1, 1), Index3(1, 7, 5), Index3(2, 3, 1)}) {
+        for (Index3 dims : {Index3(0, 0, 0), Index3(5, 0, 3), Index3(1, 1, 1), Index3(1, 7, 5),
+                            Index3(2, 3, 1)}) {
             SCOPED_TRACE(fmt::format("{} {}x{}x{}", type->id, dims.x, dims.y, dims.z));
-            for_each_wiring(*type, dims, [&](const NodeInputs& inputs) { EXPECT_NO_THROW(outcome_of(*type, inputs)); });
+            for_each_wiring(*type, dims, [&](const NodeInputs& inputs) {
+                EXPECT_NO_THROW(outcome_of(*type, inputs));
+            });
         }
     }
 }
@@ -233,7 +255,8 @@ TEST(RegistrySweep, RunTwiceGivesTheSameBytes) {
 class Endless final : public Volume {
   public:
     Endless() : Volume(big()) {}
-    void read(const Box& box, std::span<std::byte> out, const std::stop_token& stop) const override {
+    void read(const Box& box, std::span<std::byte> out,
+              const std::stop_token& stop) const override {
         check_stop(stop);
         voxels_read_ += box.voxels();
         std::fill(out.begin(), out.end(), std::byte(7));

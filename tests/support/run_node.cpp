@@ -53,12 +53,14 @@ class OneDescription final : public Description {
     }
     const std::vector<ValueDesc>& inputs(std::string_view port) const override {
         static const std::vector<ValueDesc> none;
-        if (!type_.find_input(port)) fail("{}: asks for an input '{}' that it does not have", type_.id, port);
+        if (!type_.find_input(port))
+            fail("{}: asks for an input '{}' that it does not have", type_.id, port);
         auto it = inputs_.find(port);
         return it == inputs_.end() ? none : it->second;
     }
     void output(std::string_view port, ValueDesc desc) override {
-        if (!type_.find_output(port)) fail("{}: describes an output '{}' that it does not have", type_.id, port);
+        if (!type_.find_output(port))
+            fail("{}: describes an output '{}' that it does not have", type_.id, port);
         result.outputs[std::string(port)] = std::move(desc);
     }
     void problem(std::string message, std::string_view where) override {
@@ -87,7 +89,8 @@ class OneEvaluation final : public Evaluation {
     }
     const std::vector<Value>& values(std::string_view port) const override {
         static const std::vector<Value> none;
-        if (!type_.find_input(port)) fail("{}: asks for an input '{}' that it does not have", type_.id, port);
+        if (!type_.find_input(port))
+            fail("{}: asks for an input '{}' that it does not have", type_.id, port);
         auto it = inputs_.find(port);
         return it == inputs_.end() ? none : it->second;
     }
@@ -152,7 +155,8 @@ class OneEvaluation final : public Evaluation {
 void check_promise(const NodeType& type, const NodeRun& run) {
     for (const PortSpec& port : type.outputs) {
         auto it = run.outputs.find(port.key);
-        if (it == run.outputs.end()) fail("{}: does not deliver its output '{}'", type.id, port.key);
+        if (it == run.outputs.end())
+            fail("{}: does not deliver its output '{}'", type.id, port.key);
         const VolumeDesc* promised = run.described.find(port.key)->second.volume();
         if (!promised) continue;
         ValueDesc desc = describe(it->second);
@@ -171,12 +175,13 @@ Params params_from_yaml(const NodeType& type, const std::string& yaml,
     Params params(type.params,
                   graph_folder.empty() ? std::filesystem::path(VOXLOOM_SOURCE_DIR) : graph_folder);
     if (yaml.empty()) return params;
-    const Document document =
-        Document::parse("voxloom: 1\nnodes:\n  - {id: node, type: " + type.id + ", set: " + yaml + "}\n");
+    const Document document = Document::parse(
+        "voxloom: 1\nnodes:\n  - {id: node, type: " + type.id + ", set: " + yaml + "}\n");
     for (const GraphParam& given : document.graph().nodes.front().params) {
         const ParamSpec* spec = type.find_param(given.key);
         if (!spec)
-            fail("{}: unknown parameter '{}'{}", type.id, given.key, did_you_mean(given.key, keys_of(type)));
+            fail("{}: unknown parameter '{}'{}", type.id, given.key,
+                 did_you_mean(given.key, keys_of(type)));
         std::string reason;
         std::optional<ParamValue> value = parse_param(*spec, given.yaml, reason);
         if (!value) fail("{}: parameter '{}' {}", type.id, given.key, reason);
@@ -185,8 +190,9 @@ Params params_from_yaml(const NodeType& type, const std::string& yaml,
     return params;
 }
 
-NodeDescribed describe_node(const NodeType& type, const Params& params,
-                            const std::map<std::string, std::vector<ValueDesc>, std::less<>>& inputs) {
+NodeDescribed describe_node(
+    const NodeType& type, const Params& params,
+    const std::map<std::string, std::vector<ValueDesc>, std::less<>>& inputs) {
     OneDescription description(type, params, inputs);
     if (type.describe) type.describe(description);
     return std::move(description.result);

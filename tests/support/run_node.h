@@ -26,8 +26,9 @@ using NodeInputs = std::map<std::string, std::vector<Value>, std::less<>>;
 
 struct RunNodeOptions {
     std::stop_token stop;
-    std::filesystem::path graph_folder;   // base of relative path_in; empty: the source folder
-    std::filesystem::path output_folder;  // base of relative path_out; empty: path_out stays as given
+    std::filesystem::path graph_folder;  // base of relative path_in; empty: the source folder
+    std::filesystem::path
+        output_folder;  // base of relative path_out; empty: path_out stays as given
     bool wants_provisional = false;
 };
 
@@ -39,7 +40,7 @@ struct NodeRun {
     std::map<std::string, double> counters;
     std::map<std::string, std::pair<double, std::string>> measurements;  // value, unit
     std::vector<std::string> warnings;
-    std::vector<double> progress;          // fractions, in the order in which they came
+    std::vector<double> progress;  // fractions, in the order in which they came
     std::uint64_t working_memory = 0;
     double draw_seconds = 0;
 
@@ -47,7 +48,8 @@ struct NodeRun {
     template <class T>
     std::shared_ptr<const T> output(std::string_view port) const {
         auto it = outputs.find(port);
-        auto* p = it == outputs.end() ? nullptr : std::get_if<std::shared_ptr<const T>>(&it->second);
+        auto* p =
+            it == outputs.end() ? nullptr : std::get_if<std::shared_ptr<const T>>(&it->second);
         if (!p || !*p) fail("output '{}' is not there", port);
         return *p;
     }
@@ -56,8 +58,8 @@ struct NodeRun {
     double measured(std::string_view name) const;  // throws Error when it was not measured
 };
 
-// The parameters of a node type, from a YAML mapping in one line ("{size: [64, 64], shading: true}").
-// Throws Error for unknown keys and for what is no value of theirs.
+// The parameters of a node type, from a YAML mapping in one line ("{size: [64, 64], shading:
+// true}"). Throws Error for unknown keys and for what is no value of theirs.
 Params params_from_yaml(const NodeType& type, const std::string& yaml,
                         const std::filesystem::path& graph_folder = {});
 
@@ -67,15 +69,17 @@ struct NodeDescribed {
     std::vector<std::string> problems;
     std::uint64_t working_memory = 0;
 };
-NodeDescribed describe_node(const NodeType& type, const Params& params,
-                            const std::map<std::string, std::vector<ValueDesc>, std::less<>>& inputs);
+NodeDescribed describe_node(
+    const NodeType& type, const Params& params,
+    const std::map<std::string, std::vector<ValueDesc>, std::less<>>& inputs);
 
 // Describes and evaluates; the node's own thread (worker or OpenGL) is respected. Problems of the
 // description are thrown as Error, as are the evaluation's; so is an output that is missing or is
 // not what the description said.
 NodeRun run_node(const NodeType& type, const Params& params, const NodeInputs& inputs = {},
                  const RunNodeOptions& options = {});
-NodeRun run_node(const Registry& registry, std::string_view type, const std::string& params_yaml = {},
-                 const NodeInputs& inputs = {}, const RunNodeOptions& options = {});
+NodeRun run_node(const Registry& registry, std::string_view type,
+                 const std::string& params_yaml = {}, const NodeInputs& inputs = {},
+                 const RunNodeOptions& options = {});
 
 }  // namespace voxloom::testing

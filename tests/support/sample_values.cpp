@@ -13,10 +13,12 @@ namespace {
 
 VolumePtr sample_volume(Index3 dims, double time = 0) {
     VolumePtr plain = make_volume(dims, ScalarType::u8, [&](auto x, auto y, auto z) {
-        return 120 + 90 * std::sin(0.31 * double(x) + time) * std::cos(0.23 * double(y)) + 0.7 * double(z);
+        return 120 + 90 * std::sin(0.31 * double(x) + time) * std::cos(0.23 * double(y)) +
+               0.7 * double(z);
     });
     VolumeDesc desc = plain->desc();
-    desc.index_to_world = glm::scale(glm::rotate(glm::dmat4(1.0), 0.4, glm::dvec3(1, 2, 3)), glm::dvec3(1, 1, 2.5));
+    desc.index_to_world =
+        glm::scale(glm::rotate(glm::dmat4(1.0), 0.4, glm::dvec3(1, 2, 3)), glm::dvec3(1, 1, 2.5));
     desc.unit = "mm";
     desc.name = "sample";
     Buffer voxels(desc.dense_bytes());
@@ -27,7 +29,8 @@ VolumePtr sample_volume(Index3 dims, double time = 0) {
 // One level, no parents, families of one: the simplest codec there is.
 class FlatBricks final : public Bricks {
   public:
-    explicit FlatBricks(VolumePtr volume) : Bricks(describe_flat(volume->desc())), volume_(std::move(volume)) {}
+    explicit FlatBricks(VolumePtr volume)
+        : Bricks(describe_flat(volume->desc())), volume_(std::move(volume)) {}
     BrickInfo info(BrickId) const override {
         BrickInfo info;
         info.range = {0, 255};
@@ -35,7 +38,8 @@ class FlatBricks final : public Bricks {
         return info;
     }
     std::optional<BrickId> parent(BrickId) const override { return std::nullopt; }
-    std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels*, const std::stop_token& stop) const override {
+    std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels*,
+                                     const std::stop_token& stop) const override {
         const Box box = desc().box_of(id);
         auto brick = std::make_shared<BrickVoxels>();
         brick->stored = box.dims();
@@ -75,9 +79,15 @@ class Bytes {
     void add(std::span<const std::byte> more) { all.insert(all.end(), more.begin(), more.end()); }
     void text(const std::string& s) { add(std::as_bytes(std::span(s.data(), s.size()))); }
     template <class T>
-    void number(T v) { add(std::as_bytes(std::span<const T, 1>(&v, 1))); }
-    void numbers(const glm::dvec4& v) { for (int i = 0; i < 4; ++i) number(v[i]); }
-    void numbers(const glm::dvec3& v) { for (int i = 0; i < 3; ++i) number(v[i]); }
+    void number(T v) {
+        add(std::as_bytes(std::span<const T, 1>(&v, 1)));
+    }
+    void numbers(const glm::dvec4& v) {
+        for (int i = 0; i < 4; ++i) number(v[i]);
+    }
+    void numbers(const glm::dvec3& v) {
+        for (int i = 0; i < 3; ++i) number(v[i]);
+    }
 
     void operator()(std::monostate) {}
     void operator()(const VolumePtr& v) {
@@ -146,10 +156,14 @@ class Bytes {
         for (const auto& c : t->columns) text(c.name + "|" + c.unit + ";");
         for (const auto& row : t->rows)
             for (const Table::Cell& cell : row)
-                std::visit([&](const auto& v) {
-                    if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>) text(v + ";");
-                    else number(v);
-                }, cell);
+                std::visit(
+                    [&](const auto& v) {
+                        if constexpr (std::is_same_v<std::decay_t<decltype(v)>, std::string>)
+                            text(v + ";");
+                        else
+                            number(v);
+                    },
+                    cell);
     }
 
     std::vector<std::byte> all;
@@ -173,7 +187,8 @@ class Bytes {
 
 Value sample_value(PortType type, Index3 dims) {
     switch (type) {
-        case PortType::volume: return sample_volume(dims);
+        case PortType::volume:
+            return sample_volume(dims);
         case PortType::series: {
             SeriesDesc desc;
             desc.step = sample_volume(dims)->desc();
@@ -181,12 +196,15 @@ Value sample_value(PortType type, Index3 dims) {
             desc.time_unit = "s";
             return SeriesPtr(std::make_shared<SampleSeries>(desc, dims));
         }
-        case PortType::bricks: return BricksPtr(std::make_shared<FlatBricks>(sample_volume(dims)));
+        case PortType::bricks:
+            return BricksPtr(std::make_shared<FlatBricks>(sample_volume(dims)));
         case PortType::lattice: {
             LatticeDesc desc;
             desc.kind = "bcc";
-            std::vector<Value> grids = {sample_volume(dims), sample_volume(glm::max(dims - Index3(1), Index3(0)), 0.1)};
-            for (const Value& grid : grids) desc.grids.push_back({describe(grid), glm::dvec3(desc.grids.size() * 0.5), 0});
+            std::vector<Value> grids = {sample_volume(dims),
+                                        sample_volume(glm::max(dims - Index3(1), Index3(0)), 0.1)};
+            for (const Value& grid : grids)
+                desc.grids.push_back({describe(grid), glm::dvec3(desc.grids.size() * 0.5), 0});
             return LatticePtr(std::make_shared<Lattice>(desc, grids));
         }
         case PortType::selection: {
@@ -196,7 +214,8 @@ Value sample_value(PortType type, Index3 dims) {
         }
         case PortType::transfer: {
             auto transfer = std::make_shared<TransferFunction>();
-            transfer->one.points = {{0, {0, 0, 0, 0}}, {100, {0.02, 0.01, 0.04, 0.05}}, {255, {0.5, 0.4, 0.3, 0.6}}};
+            transfer->one.points = {
+                {0, {0, 0, 0, 0}}, {100, {0.02, 0.01, 0.04, 0.05}}, {255, {0.5, 0.4, 0.3, 0.6}}};
             return TransferPtr(transfer);
         }
         case PortType::camera: {
@@ -205,7 +224,8 @@ Value sample_value(PortType type, Index3 dims) {
             camera->target = {4, 4, 8};
             return CameraPtr(camera);
         }
-        case PortType::lights: return LightsPtr(std::make_shared<Lights>());
+        case PortType::lights:
+            return LightsPtr(std::make_shared<Lights>());
         case PortType::image: {
             auto image = std::make_shared<Image>(glm::ivec2(12, 9), Image::Format::rgba32f);
             for (std::size_t i = 0; i < image->rgba32f().size(); ++i) {
@@ -217,7 +237,8 @@ Value sample_value(PortType type, Index3 dims) {
         case PortType::table: {
             auto table = std::make_shared<Table>();
             table->columns = {{"name", ""}, {"time", "s"}, {"count", ""}};
-            table->rows = {{std::string("a"), 0.25, std::int64_t(3)}, {std::string("b"), 0.5, std::int64_t(4)}};
+            table->rows = {{std::string("a"), 0.25, std::int64_t(3)},
+                           {std::string("b"), 0.5, std::int64_t(4)}};
             return TablePtr(table);
         }
     }
