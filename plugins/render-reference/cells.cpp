@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/error.h"
+#include "core/base/text.h"
 #include "plugins/render-reference/cubic.h"
 #include "plugins/render-reference/raycast.h"
 
@@ -120,6 +122,10 @@ void Raycaster::build_segments() {
         }
         segments_.push_back(s);
     };
+    for (const TransferFunction1D::Point& p : points)
+        if (!std::isfinite(glm::dot(p.emission, Emission(1.0))))
+            fail("the transfer function's extinction at {} is not finite; an opacity below 1 is",
+                 shortest(p.value));
     for (std::size_t i = 0; i < points.size(); ++i) {
         const bool begins = i == 0, new_value = begins || points[i].value > points[i - 1].value;
         if (!new_value) continue;

@@ -144,6 +144,12 @@ TEST(Raycast, HugeExtinctionIsOpaqueAndShowsTheFirstColour) {
     }
 }
 
+TEST(Raycast, ExtinctionThatIsNotFiniteIsRefused) {
+    const double inf = std::numeric_limits<double>::infinity();
+    EXPECT_THROW(Raycaster(scene_of(ramp_x(3), transfer({{0, glow(inf)}}), look({-5, 2, 2}, {0, 2, 2}))),
+                 Error);
+}
+
 TEST(Raycast, ZeroOpacityLeavesTheBackground) {
     RaycastScene scene = scene_of(waves_volume(), transfer({{0, glow(0)}}), look({5, 5, 40}, {5, 5, 5}));
     scene.background = {0.25, 0.5, 0.75, 0.5};
