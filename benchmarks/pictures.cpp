@@ -8,7 +8,8 @@
 // its knobs. What is written:
 //
 //     OUT/NODE.PORT.npy   a volume's voxels [z, y, x(, component)], a picture [y, x, rgba] float32
-//     standard output     {"values": {"NODE.PORT": ...}, "times": {"NODE": {"wall": [s...], "draw": [s...]}}}
+//     standard output     {"values": {"NODE.PORT": ...}, "times": {"NODE": {"wall": [s...], "draw":
+//     [s...]}}}
 #include <fmt/core.h>
 
 #include <bit>
@@ -50,10 +51,12 @@ Options options_of(int argc, char** argv) {
         std::int64_t count = 0;
         if (name == "--time")
             options.timed.push_back(value);
-        else if ((name == "--repeat" || name == "--warm-up") && parse_integer(value, count) && count >= 0)
+        else if ((name == "--repeat" || name == "--warm-up") && parse_integer(value, count) &&
+                 count >= 0)
             (name == "--repeat" ? options.repeat : options.warm_up) = int(count);
         else
-            fail("{} {} is not understood; known are --repeat N, --warm-up N and --time NODE", name, value);
+            fail("{} {} is not understood; known are --repeat N, --warm-up N and --time NODE", name,
+                 value);
     }
     if (plain.size() != 2) fail("give a graph and an output folder: bench-pictures GRAPH OUT");
     options.graph = plain[0];
@@ -83,7 +86,9 @@ std::string numpy_type(ScalarType type) {
     return fmt::format("{}{}{}", bytes_of(type) == 1 ? "|" : "<", name[0], bytes_of(type));
 }
 
-json list(glm::dvec3 v) { return {v.x, v.y, v.z}; }
+json list(glm::dvec3 v) {
+    return {v.x, v.y, v.z};
+}
 
 json exported(const VolumePtr& given, const fs::path& file) {
     const VolumePtr volume = in_memory(given);
@@ -116,8 +121,12 @@ json exported(const TransferPtr& transfer) {
 }
 
 json exported(const CameraPtr& camera) {
-    return {{"eye", list(camera->eye)}, {"target", list(camera->target)}, {"up", list(camera->true_up())},
-            {"vertical_fov", camera->vertical_fov}, {"height", camera->height}, {"near", camera->near},
+    return {{"eye", list(camera->eye)},
+            {"target", list(camera->target)},
+            {"up", list(camera->true_up())},
+            {"vertical_fov", camera->vertical_fov},
+            {"height", camera->height},
+            {"near", camera->near},
             {"perspective", camera->projection == Camera::Projection::perspective}};
 }
 
@@ -156,10 +165,12 @@ json times_of(const Plan& plan, const std::string& id, ResultCache& cache, const
 
 void draw_pictures(const Options& options) {
     Registry registry;
-    for (const std::string& problem : load_plugins(registry).problems) fmt::print(stderr, "{}\n", problem);
+    for (const std::string& problem : load_plugins(registry).problems)
+        fmt::print(stderr, "{}\n", problem);
     const Document document = Document::load(options.graph);
     const Plan plan = check(document.graph(), registry);
-    for (const Problem& problem : plan.problems) fmt::print(stderr, "{}\n", problem.text(plan.file));
+    for (const Problem& problem : plan.problems)
+        fmt::print(stderr, "{}\n", problem.text(plan.file));
     if (!plan.problems.empty()) fail("{} has problems", options.graph.string());
 
     fs::create_directories(options.out);

@@ -75,8 +75,8 @@ struct Raycaster::Cell {
     glm::dvec3 gradient(double x) {
         if (!has_gradients)
             for (std::size_t i = 0; i < 8; ++i)
-                gradients[i] = std::isnan(values[i]) ? glm::dvec3(0.0)
-                                                     : field.index_gradient(corners[i]);
+                gradients[i] =
+                    std::isnan(values[i]) ? glm::dvec3(0.0) : field.index_gradient(corners[i]);
         has_gradients = true;
         return field.to_world_gradient(trilinear(gradients, weights(x)));
     }
@@ -224,9 +224,10 @@ void Raycaster::emit_cells(const Path& path, Composite& out) const {
             monotone_stretches(f, [&](double a, double b, double fa, double fb) {
                 if (fa == fb) return piece(a, b, segment_of(fa));
                 // From knot to knot, upwards or downwards.
-                auto k = std::size_t((fa < fb ? std::upper_bound(knots_.begin(), knots_.end(), fa)
-                                              : std::lower_bound(knots_.begin(), knots_.end(), fa)) -
-                                     knots_.begin());
+                auto k =
+                    std::size_t((fa < fb ? std::upper_bound(knots_.begin(), knots_.end(), fa)
+                                         : std::lower_bound(knots_.begin(), knots_.end(), fa)) -
+                                knots_.begin());
                 double x = a;
                 auto cut = [&](double knot) {
                     const double at = solve_monotone(f, x, b, knot);
@@ -256,8 +257,7 @@ void Raycaster::emit_piece(const Segment& segment, const Path& path, Cell& cell,
     };
     auto depth = [&](double a, double b) {
         double sum = 0;
-        for (const Node& node : kGauss2)
-            sum += node.weight * emission(a + (b - a) * node.x).a;
+        for (const Node& node : kGauss2) sum += node.weight * emission(a + (b - a) * node.x).a;
         return sum * (b - a) * length;
     };
 

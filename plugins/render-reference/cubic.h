@@ -30,7 +30,8 @@ struct Cubic {
 // The trilinear interpolation of a cell's corners (bit 0 of the number: x, 1: y, 2: z) along the
 // straight line from local coordinates u to u + d.
 inline Cubic trilinear_along(const std::array<double, 8>& v, glm::dvec3 u, glm::dvec3 d) {
-    // Lines along x, then their bilinear blend: every product of two lines stays a short polynomial.
+    // Lines along x, then their bilinear blend: every product of two lines stays a short
+    // polynomial.
     double line[4][2];
     for (int i = 0; i < 4; ++i) {
         double slope = v[std::size_t(2 * i + 1)] - v[std::size_t(2 * i)];
@@ -39,7 +40,8 @@ inline Cubic trilinear_along(const std::array<double, 8>& v, glm::dvec3 u, glm::
     }
     double plane[2][3];
     for (int i = 0; i < 2; ++i) {
-        const double s0 = line[2 * i + 1][0] - line[2 * i][0], s1 = line[2 * i + 1][1] - line[2 * i][1];
+        const double s0 = line[2 * i + 1][0] - line[2 * i][0],
+                     s1 = line[2 * i + 1][1] - line[2 * i][1];
         plane[i][0] = line[2 * i][0] + s0 * u.y;
         plane[i][1] = line[2 * i][1] + s1 * u.y + s0 * d.y;
         plane[i][2] = s1 * d.y;
@@ -53,7 +55,8 @@ inline Cubic trilinear_along(const std::array<double, 8>& v, glm::dvec3 u, glm::
 // The cubic through values at 0, 1/3, 2/3 and 1.
 inline Cubic cubic_through(double y0, double y1, double y2, double y3) {
     return {{y0, (-11 * y0 + 18 * y1 - 9 * y2 + 2 * y3) / 2,
-             (18 * y0 - 45 * y1 + 36 * y2 - 9 * y3) / 2, (-9 * y0 + 27 * y1 - 27 * y2 + 9 * y3) / 2}};
+             (18 * y0 - 45 * y1 + 36 * y2 - 9 * y3) / 2,
+             (-9 * y0 + 27 * y1 - 27 * y2 + 9 * y3) / 2}};
 }
 
 // Calls visit(a, b, f(a), f(b)) for the stretches of [0, 1] on which f is monotone, in order.
@@ -97,8 +100,8 @@ inline double solve_monotone(const Cubic& f, double a, double b, double v) {
 }
 
 // Quadrature on [0, 1]. Gauss's rules of two and eight points are exact to degree 3 and 15;
-// Kronrod's fifteen points to degree 22, and with the second weights seven of them are Gauss's rule,
-// exact to degree 13, so that the difference tells the error.
+// Kronrod's fifteen points to degree 22, and with the second weights seven of them are Gauss's
+// rule, exact to degree 13, so that the difference tells the error.
 struct Node {
     double x, weight, coarse = 0;
 };
@@ -112,21 +115,21 @@ inline constexpr std::array<Node, 8> kGauss8 = {{{0.019855071751231912, 0.050614
                                                  {0.7627662049581645, 0.15685332293894352},
                                                  {0.8983332387068134, 0.11119051722668717},
                                                  {0.9801449282487681, 0.050614268145188344}}};
-inline constexpr std::array<Node, 15> kKronrod15 = {{
-    {0.004272314439593694, 0.011467661005264612, 0.0},
-    {0.025446043828620757, 0.03154604631498928, 0.06474248308443485},
-    {0.06756778832011545, 0.052395005161125094, 0.0},
-    {0.12923440720030277, 0.07032662985776296, 0.13985269574463832},
-    {0.20695638226615443, 0.08450236331963396, 0.0},
-    {0.2970774243113014, 0.09517528903239271, 0.19091502525255946},
-    {0.39610752249605075, 0.10221647003764944, 0.0},
-    {0.5, 0.10474107054236391, 0.2089795918367347},
-    {0.6038924775039493, 0.10221647003764944, 0.0},
-    {0.7029225756886985, 0.09517528903239271, 0.19091502525255946},
-    {0.7930436177338456, 0.08450236331963396, 0.0},
-    {0.8707655927996972, 0.07032662985776296, 0.13985269574463832},
-    {0.9324322116798845, 0.052395005161125094, 0.0},
-    {0.9745539561713792, 0.03154604631498928, 0.06474248308443485},
-    {0.9957276855604063, 0.011467661005264612, 0.0}}};
+inline constexpr std::array<Node, 15> kKronrod15 = {
+    {{0.004272314439593694, 0.011467661005264612, 0.0},
+     {0.025446043828620757, 0.03154604631498928, 0.06474248308443485},
+     {0.06756778832011545, 0.052395005161125094, 0.0},
+     {0.12923440720030277, 0.07032662985776296, 0.13985269574463832},
+     {0.20695638226615443, 0.08450236331963396, 0.0},
+     {0.2970774243113014, 0.09517528903239271, 0.19091502525255946},
+     {0.39610752249605075, 0.10221647003764944, 0.0},
+     {0.5, 0.10474107054236391, 0.2089795918367347},
+     {0.6038924775039493, 0.10221647003764944, 0.0},
+     {0.7029225756886985, 0.09517528903239271, 0.19091502525255946},
+     {0.7930436177338456, 0.08450236331963396, 0.0},
+     {0.8707655927996972, 0.07032662985776296, 0.13985269574463832},
+     {0.9324322116798845, 0.052395005161125094, 0.0},
+     {0.9745539561713792, 0.03154604631498928, 0.06474248308443485},
+     {0.9957276855604063, 0.011467661005264612, 0.0}}};
 
 }  // namespace voxloom::reference

@@ -16,20 +16,26 @@ struct Taps {
 
 // One axis of the separable kernels. Catmull-Rom interpolates and reproduces quadratics.
 Taps taps(double x, Reconstruction reconstruction) {
-    if (reconstruction == Reconstruction::nearest) return {std::int64_t(std::floor(x + 0.5)), 1, {1}};
+    if (reconstruction == Reconstruction::nearest)
+        return {std::int64_t(std::floor(x + 0.5)), 1, {1}};
     const double base = std::floor(x), t = x - base;
     const auto i = std::int64_t(base);
     if (reconstruction == Reconstruction::trilinear) return {i, 2, {1 - t, t}};
     const double t2 = t * t, t3 = t2 * t;
-    return {i - 1, 4, {0.5 * (2 * t2 - t - t3), 0.5 * (2 - 5 * t2 + 3 * t3),
-                       0.5 * (t + 4 * t2 - 3 * t3), 0.5 * (t3 - t2)}};
+    return {i - 1,
+            4,
+            {0.5 * (2 * t2 - t - t3), 0.5 * (2 - 5 * t2 + 3 * t3), 0.5 * (t + 4 * t2 - 3 * t3),
+             0.5 * (t3 - t2)}};
 }
 
 glm::dvec3 smoothing_of(GradientStencil stencil) {
     switch (stencil) {
-        case GradientStencil::central: return {0, 1, 0};
-        case GradientStencil::sobel: return glm::dvec3(1, 2, 1) / 4.0;
-        case GradientStencil::isotropic: break;
+        case GradientStencil::central:
+            return {0, 1, 0};
+        case GradientStencil::sobel:
+            return glm::dvec3(1, 2, 1) / 4.0;
+        case GradientStencil::isotropic:
+            break;
     }
     return glm::dvec3(1, 4, 1) / 6.0;
 }
@@ -38,21 +44,27 @@ glm::dvec3 smoothing_of(GradientStencil stencil) {
 
 Field::Field(VolumePtr volume, int component, Reconstruction reconstruction,
              GradientStencil stencil, bool closed_form)
-    : volume_(std::move(volume)), data_(volume_->data()), component_(component),
-      reconstruction_(reconstruction), smoothing_(smoothing_of(stencil)) {
+    : volume_(std::move(volume)),
+      data_(volume_->data()),
+      component_(component),
+      reconstruction_(reconstruction),
+      smoothing_(smoothing_of(stencil)) {
     const VolumeDesc& d = desc();
     if (closed_form) {
         form_ = volume_->closed_form();
         if (!form_)
-            fail("'{}' has no closed form to integrate; set field to voxels, or wire an analytic "
-                 "phantom", d.name.empty() ? "the volume" : d.name);
+            fail(
+                "'{}' has no closed form to integrate; set field to voxels, or wire an analytic "
+                "phantom",
+                d.name.empty() ? "the volume" : d.name);
         if (d.color) fail("a closed form has no colours; set field to voxels");
     }
     const glm::dmat3 linear(d.index_to_world);
     const double determinant = glm::determinant(linear);
     if (!(std::abs(determinant) > 0) || !std::isfinite(determinant))
-        fail("the volume's index-to-world matrix cannot be inverted; every axis needs a spacing "
-             "that is not zero and a direction of its own");
+        fail(
+            "the volume's index-to-world matrix cannot be inverted; every axis needs a spacing "
+            "that is not zero and a direction of its own");
     world_to_index_ = glm::inverse(linear);
     gradient_to_world_ = glm::transpose(world_to_index_);
     if (d.has_mask && d.voxels() > 0) {
@@ -96,9 +108,9 @@ glm::dvec3 Field::index_gradient(Index3 i) const {
         for (int y = -1; y <= 1; ++y)
             for (int x = -1; x <= 1; ++x) {
                 const glm::dvec3 smooth(smoothing_[x + 1], smoothing_[y + 1], smoothing_[z + 1]);
-                const glm::dvec3 weight = 0.5 * glm::dvec3(x * smooth.y * smooth.z,
-                                                           y * smooth.x * smooth.z,
-                                                           z * smooth.x * smooth.y);
+                const glm::dvec3 weight =
+                    0.5 * glm::dvec3(x * smooth.y * smooth.z, y * smooth.x * smooth.z,
+                                     z * smooth.x * smooth.y);
                 if (weight == glm::dvec3(0.0)) continue;
                 const double v = voxel(i + Index3(x, y, z));
                 if (!std::isnan(v)) g += weight * (v - centre);
@@ -135,8 +147,7 @@ Field::Footprint Field::footprint(glm::dvec3 p) const {
     if (gather(p, reconstruction_, f)) return f;
     // What remains of a kernel with negative lobes may add up to next to nothing: beside invalid
     // voxels the tricubic one is replaced by the trilinear one before weights are renormalised.
-    if (reconstruction_ == Reconstruction::tricubic &&
-        gather(p, Reconstruction::trilinear, f))
+    if (reconstruction_ == Reconstruction::tricubic && gather(p, Reconstruction::trilinear, f))
         return f;
     double sum = 0;
     for (int n = 0; n < f.count; ++n) sum += f.weights[std::size_t(n)];
@@ -149,7 +160,8 @@ double Field::value(glm::dvec3 p) const {
     const Footprint f = footprint(p);
     if (f.count == 0) return kInvalid;
     double v = 0;
-    for (int n = 0; n < f.count; ++n) v += f.weights[std::size_t(n)] * voxel(f.voxels[std::size_t(n)]);
+    for (int n = 0; n < f.count; ++n)
+        v += f.weights[std::size_t(n)] * voxel(f.voxels[std::size_t(n)]);
     return v;
 }
 

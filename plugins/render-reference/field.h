@@ -19,8 +19,9 @@ inline constexpr double kInvalid = std::numeric_limits<double>::quiet_NaN();
 // whose whole footprint is: both are answered with NaN.
 class Field {
   public:
-    // `volume` must be in memory unless its closed form is taken. `component` is what is classified; of a colour volume it is the
-    // luma. With `closed_form` values and gradients are the volume's own formula, exact.
+    // `volume` must be in memory unless its closed form is taken. `component` is what is
+    // classified; of a colour volume it is the luma. With `closed_form` values and gradients are
+    // the volume's own formula, exact.
     Field(VolumePtr volume, int component, Reconstruction reconstruction, GradientStencil stencil,
           bool closed_form);
 
@@ -33,7 +34,9 @@ class Field {
     // The stencil's derivative at one voxel, still per index step. An invalid neighbour counts as
     // the voxel itself, so that it adds no slope.
     glm::dvec3 index_gradient(Index3 i) const;
-    glm::dvec3 to_world_gradient(glm::dvec3 per_index) const { return gradient_to_world_ * per_index; }
+    glm::dvec3 to_world_gradient(glm::dvec3 per_index) const {
+        return gradient_to_world_ * per_index;
+    }
 
     double value(glm::dvec3 p) const;
     glm::dvec3 gradient(glm::dvec3 p) const;
@@ -42,7 +45,9 @@ class Field {
 
     // World to index coordinates, of points and of directions. Positions are taken relative to the
     // volume's origin first, so that far-away worlds lose no digits.
-    glm::dvec3 to_index(glm::dvec3 world) const { return world_to_index_ * (world - desc().origin()); }
+    glm::dvec3 to_index(glm::dvec3 world) const {
+        return world_to_index_ * (world - desc().origin());
+    }
     glm::dvec3 direction_to_index(glm::dvec3 world) const { return world_to_index_ * world; }
     glm::dvec3 to_world(glm::dvec3 index) const;
 

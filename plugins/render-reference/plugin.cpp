@@ -10,7 +10,8 @@ namespace voxloom::reference {
 namespace {
 
 const std::vector<std::string> kReconstructions = {"nearest", "trilinear", "tricubic"};
-const std::vector<std::string> kCompositings = {"emission-absorption", "mip", "x-ray", "isosurface"};
+const std::vector<std::string> kCompositings = {"emission-absorption", "mip", "x-ray",
+                                                "isosurface"};
 const std::vector<std::string> kGradients = {"central", "sobel", "isotropic"};
 const std::vector<std::string> kModes = {"auto", "cells", "steps"};
 
@@ -52,7 +53,7 @@ void describe(Description& node) {
     const ValueDesc* source = node.input("source");
     const VolumeDesc* volume = source ? source->volume() : nullptr;
     if (scene.closed_form && source && source->type == PortType::bricks)
-        node.problem("Bricks have no closed form; wire the phantom's volume itself, or choose voxels",
+        node.problem("Bricks have no closed form; wire the phantom itself or choose voxels",
                      "field");
     if (!volume) return;
     if (!volume->color && scene.component >= volume->components)
@@ -90,14 +91,14 @@ NodeType raycast() {
     NodeType type;
     type.id = "reference.raycast";
     type.title = "Reference ray caster";
-    type.doc = "Draws a volume slowly, in double precision and as exactly as it can be: the picture "
-               "that errors are measured against.";
+    type.doc = "Draws a volume slowly, in double precision and as exactly as it can be: the "
+               "picture that errors are measured against.";
     type.keywords = {"render", "ray casting", "truth", "ground truth", "CPU", "double", "error"};
     type.inputs = {
-        {"source", {PortType::volume, PortType::bricks}, "What is drawn; of Bricks, the finest level."},
+        {"source", {PortType::volume, PortType::bricks}, "What is drawn; of Bricks, the finest."},
         {"transfer", PortType::transfer, "What the values look like."},
         {"camera", PortType::camera, "Where it is seen from."},
-        {"lights", PortType::lights, "What shines on it when shading is on; a headlight by default.",
+        {"lights", PortType::lights, "What shines on it with shading; by default a headlight.",
          true},
     };
     type.outputs = {{"image", PortType::image, "The picture, background under it."}};
@@ -129,31 +130,32 @@ NodeType raycast() {
             .range(0, std::numeric_limits<double>::infinity())
             .in_unit("value per length").in_group("Gradient"),
         param::choice("mode", kModes, "auto",
-                      "Exact integration cell by cell, sampling at steps, or cells where they can be.")
+                      "Exact integration cell by cell, sampling at steps, or cells where possible.")
             .in_group("Accuracy").is_quality(),
         param::real("step", 0.1, "Distance of samples where steps are used.")
             .range(1e-4, 16).slider(0.01, 2, Scale::logarithmic).in_unit("voxels")
             .in_group("Accuracy").shown_if("mode", {"auto", "steps"}).is_quality(),
     };
-    type.method = R"(**Method.** Inside one cell a trilinear field is a cubic of the way along a ray. In
-mode `cells` each ray is walked cell by cell. The cubic is cut where it turns and where it meets a
-control point of the transfer function; on a piece the extinction is a cubic again, its optical depth
-is integrated exactly, and the colour in closed form where the piece has one colour, else by an
+    type.method =
+        R"(**Method.** Inside one cell a trilinear field is a cubic of the way along a ray. In mode
+`cells` each ray is walked cell by cell. The cubic is cut where it turns and where it meets a control
+point of the transfer function; on a piece the extinction is a cubic again, its optical depth is
+integrated exactly, and the colour in closed form where the piece has one colour, else by an
 eight-point Gauss rule on stretches of optical depth below 1/2. Transfer functions with steps and
-peaks of any sharpness are therefore met exactly. With shading a 15-point Gauss-Kronrod rule halves
-the stretches until it errs by less than 1e-7.
-Maximum intensity takes the largest value of the cubics, isosurface the first crossing.
+peaks of any sharpness are therefore met exactly. With shading a 15-point Gauss-Kronrod rule
+halves the stretches until it errs by less than 1e-7. Maximum intensity takes the largest value of
+the cubics, isosurface the first crossing.
 
-In mode `steps` the ray is sampled at the middles of equal steps of at most `step` times the smallest
-spacing, each with its exact absorption; the error falls with the square of the step where field and
-transfer function are continuous, with the step where the transfer function jumps. It serves what is
-no cubic: tricubic reconstruction, 2-D transfer functions, gradient-magnitude modulation, colour
-volumes, and `field: closed-form`, which integrates the formula of an analytic phantom and so shows
-the error of sampling itself.
+In mode `steps` the ray is sampled at the middles of equal steps of at most `step` times the
+smallest spacing, each with its exact absorption; the error falls with the square of the step
+where field and transfer function are continuous, with the step where the transfer function jumps.
+It serves what is no cubic: tricubic reconstruction, 2-D transfer functions, gradient-magnitude
+modulation, colour volumes, and `field: closed-form`, which integrates the formula of an analytic
+phantom and so shows the error of sampling itself.
 
 Masked voxels and those that are not finite are left out, the weights of their neighbours
-renormalised (beside them tricubic falls back to trilinear); where no neighbour is left the volume is
-transparent. Gradient stencils replicate the border.
+renormalised (beside them tricubic falls back to trilinear); where no neighbour is left the volume
+is transparent. Gradient stencils replicate the border.
 
 **When to use.** As the second input of `metrics.image`, to state the error of any other renderer.
 

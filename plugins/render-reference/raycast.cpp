@@ -127,9 +127,8 @@ glm::dvec4 Raycaster::show(const Hit& hit, const Path& path) const {
     const glm::dvec3 p = path.at(hit.t);
     if (scene_.compositing == Compositing::isosurface) {
         const TransferFunction& transfer = *scene_.transfer;
-        Emission e = transfer.two
-                         ? transfer.two->at(hit.value, glm::length(field_.gradient(p)))
-                         : transfer.one.at(hit.value);
+        Emission e = transfer.two ? transfer.two->at(hit.value, glm::length(field_.gradient(p)))
+                                  : transfer.one.at(hit.value);
         e = e.a > 0 ? e / e.a : Emission(1.0);
         if (field_.desc().color) e = Emission(glm::dvec3(field_.color(p)), 1.0);
         return scene_.shading ? lit(e, field_.gradient(p), p, path) : e;
@@ -168,19 +167,22 @@ Image Raycaster::image(const std::stop_token& stop,
                            scene_.background.a);
     std::span<glm::vec4> pixels = image.rgba32f();
     std::atomic<int> rows_done{0};
-    parallel_for(0, size.y, 1, [&](std::int64_t from, std::int64_t to) {
-        for (std::int64_t y = from; y < to; ++y) {
-            for (int x = 0; x < size.x; ++x) {
-                check_stop(stop);
-                const glm::dvec4 c =
-                    trace(scene_.camera->ray(x + 0.5, double(y) + 0.5, size.x, size.y));
-                pixels[std::size_t(y) * std::size_t(size.x) + std::size_t(x)] =
-                    glm::vec4(c + (1 - c.a) * under);
+    parallel_for(
+        0, size.y, 1,
+        [&](std::int64_t from, std::int64_t to) {
+            for (std::int64_t y = from; y < to; ++y) {
+                for (int x = 0; x < size.x; ++x) {
+                    check_stop(stop);
+                    const glm::dvec4 c =
+                        trace(scene_.camera->ray(x + 0.5, double(y) + 0.5, size.x, size.y));
+                    pixels[std::size_t(y) * std::size_t(size.x) + std::size_t(x)] =
+                        glm::vec4(c + (1 - c.a) * under);
+                }
+                const int done = ++rows_done;
+                if (progress) progress(double(done) / size.y);
             }
-            const int done = ++rows_done;
-            if (progress) progress(double(done) / size.y);
-        }
-    }, stop);
+        },
+        stop);
     return image;
 }
 

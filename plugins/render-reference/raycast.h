@@ -1,13 +1,13 @@
 // The reference ray integrator: slow, in double precision, the truth that other pictures are
 // measured against.
 //
-// Along a ray through one cell a trilinear field is an exact cubic. Where that can be used ("cells"),
-// the ray is walked cell by cell; the cubic is cut where it turns and where it meets a control point
-// of the transfer function, and on every piece the extinction is a cubic again: its integral, the
-// optical depth, is exact, and the colour is a closed form (one colour) or an eight-point Gauss rule
-// on stretches of little optical depth. Maxima and isosurfaces are those of the cubic itself. What
-// is no cubic (other kernels, gradients in the extinction, closed forms) is sampled at the middles
-// of short steps ("steps"), whose error falls with the square of the step.
+// Along a ray through one cell a trilinear field is an exact cubic. Where that can be used
+// ("cells"), the ray is walked cell by cell; the cubic is cut where it turns and where it meets a
+// control point of the transfer function, and on every piece the extinction is a cubic again: its
+// integral, the optical depth, is exact, and the colour is a closed form (one colour) or an
+// eight-point Gauss rule on stretches of little optical depth. Maxima and isosurfaces are those of
+// the cubic itself. What is no cubic (other kernels, gradients in the extinction, closed forms) is
+// sampled at the middles of short steps ("steps"), whose error falls with the square of the step.
 #pragma once
 
 #include <functional>
@@ -41,9 +41,9 @@ struct RaycastScene {
     GradientStencil gradient = GradientStencil::isotropic;
     glm::dvec2 gradient_modulation{0.0};  // smoothstep from .x to .y; both 0: off
     int component = 0;
-    glm::dvec4 background{0, 0, 0, 1};    // colour and opacity, not premultiplied
-    bool closed_form = false;             // the volume's own formula instead of its voxels
-    double step = 0.1;                    // of "steps", in voxels: of the smallest spacing
+    glm::dvec4 background{0, 0, 0, 1};  // colour and opacity, not premultiplied
+    bool closed_form = false;           // the volume's own formula instead of its voxels
+    double step = 0.1;                  // of "steps", in voxels: of the smallest spacing
     Mode mode = Mode::automatic;
 };
 
@@ -90,14 +90,15 @@ class Raycaster {
         double value = 0, per_value = 0;  // per_value 0: constant
         Emission first{0.0}, slope{0.0};
         bool transparent = false;
-        bool one_color = false;           // everything on it has this colour
+        bool one_color = false;  // everything on it has this colour
         glm::dvec3 color{0.0};
     };
     struct Cell;
 
     std::optional<Path> clip(const Ray& ray) const;
     Emission classify(glm::dvec3 p, double value) const;
-    Emission lit(const Emission& emission, glm::dvec3 gradient, glm::dvec3 p, const Path& path) const;
+    Emission lit(const Emission& emission, glm::dvec3 gradient, glm::dvec3 p,
+                 const Path& path) const;
     glm::dvec4 show(const Hit& hit, const Path& path) const;
 
     // cells.cpp

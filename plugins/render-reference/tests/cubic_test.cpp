@@ -14,7 +14,8 @@ TEST(Cubic, AlongALineEqualsTheTrilinearInterpolationOfTheCorners) {
     for (int n = 0; n < 200; ++n) {
         std::array<double, 8> v;
         for (double& each : v) each = any(random);
-        const glm::dvec3 u(any(random), any(random), any(random)), d(any(random), any(random), any(random));
+        const glm::dvec3 u(any(random), any(random), any(random)),
+            d(any(random), any(random), any(random));
         const Cubic f = trilinear_along(v, u, d);
         for (double x : {0.0, 0.3, 1.0}) {
             const glm::dvec3 p = u + x * d;

@@ -36,7 +36,8 @@ std::vector<std::byte> bytes(const ImagePtr& image) {
 }
 
 TEST(ReferenceNode, DrawsAPictureOfTheSizeAskedFor) {
-    const auto run = run_node(registry(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
+    const auto run =
+        run_node(registry(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
     EXPECT_EQ(run.image()->size(), glm::ivec2(20, 10));
     float brightest = 0;
     for (const glm::vec4& pixel : run.image()->rgba32f()) {
@@ -63,7 +64,8 @@ TEST(ReferenceNode, LightsReplaceTheHeadlight) {
     NodeInputs lit = inputs(waves_volume());
     lit["lights"] = {LightsPtr(dark)};
     // Without lights and with full ambient light a shaded picture is the unshaded one.
-    const auto shaded = run_node(registry(), "reference.raycast", "{size: [16, 16], shading: true}", lit).image();
+    const auto shaded =
+        run_node(registry(), "reference.raycast", "{size: [16, 16], shading: true}", lit).image();
     const auto plain = run_node(registry(), "reference.raycast", "{size: [16, 16]}", lit).image();
     for (int y = 0; y < 16; ++y)
         for (int x = 0; x < 16; ++x)
@@ -79,7 +81,8 @@ TEST(ReferenceNode, WrongCombinationsAreNamedBeforeAnythingIsDrawn) {
         }
         return "";
     };
-    EXPECT_NE(message("{mode: cells, reconstruction: tricubic}").find("steps or auto"), std::string::npos);
+    EXPECT_NE(message("{mode: cells, reconstruction: tricubic}").find("steps or auto"),
+              std::string::npos);
     EXPECT_NE(message("{component: 1}").find("component 1 is not there"), std::string::npos);
     EXPECT_NE(message("{gradient_modulation: [2, 1]}").find("must not exceed"), std::string::npos);
     EXPECT_NE(message("{field: closed-form}").find("no closed form"), std::string::npos);

@@ -41,13 +41,14 @@ double chord(const Ray& ray, glm::dvec3 hi) {
     return std::max(0.0, t1 - t0);
 }
 
-const std::vector<glm::dvec3> kViews = {{0, 0, 1},  {1, 0, 0},    {0, -1, 0},     {1, 1, 0},
-                                        {1, 1, 1},  {-1, 1, -1},  {1, 1 + 1e-7, 0}, {0.3, -0.7, 0.2},
-                                        {0, 1, -1}, {1e-9, 1, 0}, {-5, 3, 1}};
+const std::vector<glm::dvec3> kViews = {
+    {0, 0, 1},        {1, 0, 0},        {0, -1, 0}, {1, 1, 0},    {1, 1, 1}, {-1, 1, -1},
+    {1, 1 + 1e-7, 0}, {0.3, -0.7, 0.2}, {0, 1, -1}, {1e-9, 1, 0}, {-5, 3, 1}};
 
 TEST(Raycast, ConstantMediumIsOneMinusExpOfItsDepthForAnyView) {
     const glm::dvec3 spacing(1, 0.5, 2.5), hi = glm::dvec3(8, 6, 4) * spacing;
-    const auto volume = make_volume({9, 7, 5}, ScalarType::u8, [](auto, auto, auto) { return 7; }, spacing);
+    const auto volume = make_volume(
+        {9, 7, 5}, ScalarType::u8, [](auto, auto, auto) { return 7; }, spacing);
     const double tau = 0.31;
     const glm::dvec3 color(0.25, 0.5, 1);
     for (bool perspective : {true, false})
@@ -68,15 +69,16 @@ TEST(Raycast, ConstantMediumIsOneMinusExpOfItsDepthForAnyView) {
                         const Ray ray = camera.ray(x, y, 16, 16);
                         const double alpha = -std::expm1(-tau * chord(ray, hi));
                         hits += alpha > 0;
-                        EXPECT_LT(largest_difference(caster.trace(ray), {color * alpha, alpha}), 1e-12);
+                        EXPECT_LT(largest_difference(caster.trace(ray), {color * alpha, alpha}),
+                                  1e-12);
                     }
                 EXPECT_GT(hits, 10);
             }
 }
 
 TEST(Raycast, CameraInsideSeesOnlyWhatIsBeforeIt) {
-    const RaycastScene scene = scene_of(constant({9, 9, 9}, 1), transfer({{0, glow(0.2)}}),
-                                        look({4, 4, 3}, {4, 4, 0}));
+    const RaycastScene scene =
+        scene_of(constant({9, 9, 9}, 1), transfer({{0, glow(0.2)}}), look({4, 4, 3}, {4, 4, 0}));
     const Raycaster caster(scene);
     EXPECT_NEAR(caster.trace({{4, 4, 3}, {0, 0, -1}}).a, -std::expm1(-0.6), 1e-14);
 }
@@ -93,12 +95,14 @@ TEST(Raycast, NothingNearerThanTheNearPlaneIsDrawn) {
 
 TEST(Raycast, RampThroughABoxIsItsWidthWhateverTheView) {
     // tau on values 2 to 5.5 of a ramp of slope 1 in x: the ray spends 3.5 / |d.x| in it.
-    const TransferPtr box = transfer({{2, glow(0)}, {2, glow(0.4, {1, 0.5, 0})},
-                                      {5.5, glow(0.4, {1, 0.5, 0})}, {5.5, glow(0)}});
-    for (glm::dvec3 direction : {glm::dvec3(1, 0, 0), {-1, 0, 0}, {1, 0.2, -0.1}, {-1, 0.1, 0.15}}) {
+    const TransferPtr box = transfer(
+        {{2, glow(0)}, {2, glow(0.4, {1, 0.5, 0})}, {5.5, glow(0.4, {1, 0.5, 0})}, {5.5, glow(0)}});
+    for (glm::dvec3 direction :
+         {glm::dvec3(1, 0, 0), {-1, 0, 0}, {1, 0.2, -0.1}, {-1, 0.1, 0.15}}) {
         direction = glm::normalize(direction);
         const glm::dvec3 middle(4.5, 2, 2);
-        const RaycastScene scene = scene_of(ramp_x(10), box, look(middle - 20.0 * direction, middle));
+        const RaycastScene scene =
+            scene_of(ramp_x(10), box, look(middle - 20.0 * direction, middle));
         const glm::dvec4 seen = Raycaster(scene).trace({middle - 20.0 * direction, direction});
         const double alpha = -std::expm1(-0.4 * 3.5 / std::abs(direction.x));
         EXPECT_LT(largest_difference(seen, {alpha, 0.5 * alpha, 0, alpha}), 1e-13);
@@ -123,10 +127,10 @@ TEST(Raycast, APeakOfAnyWidthKeepsItsIntegral) {
     // A triangle of extinction of area A in value, met once on a ramp of slope 1: depth A.
     for (double width : {1.0, 1e-3, 1e-6, 1e-9}) {
         const double area = 0.7;
-        const RaycastScene scene =
-            scene_of(ramp_x(10),
-                     transfer({{4.3 - width, glow(0)}, {4.3, glow(area / width)}, {4.3 + width, glow(0)}}),
-                     look({-5, 2, 2}, {0, 2, 2}));
+        const RaycastScene scene = scene_of(
+            ramp_x(10),
+            transfer({{4.3 - width, glow(0)}, {4.3, glow(area / width)}, {4.3 + width, glow(0)}}),
+            look({-5, 2, 2}, {0, 2, 2}));
         EXPECT_NEAR(Raycaster(scene).trace({{-5, 2, 2}, {1, 0, 0}}).a, -std::expm1(-area),
                     1e-13 + 1e-15 / width);
     }
@@ -135,7 +139,9 @@ TEST(Raycast, APeakOfAnyWidthKeepsItsIntegral) {
 TEST(Raycast, HugeExtinctionIsOpaqueAndShowsTheFirstColour) {
     for (double tau : {1e3, 1e9, 1e30, 1e300}) {
         const RaycastScene scene = scene_of(
-            ramp_x(10), transfer({{2, glow(0, {0, 1, 0})}, {2, glow(tau, {0, 1, 0})}, {8, glow(tau, {1, 0, 0})}}),
+            ramp_x(10),
+            transfer(
+                {{2, glow(0, {0, 1, 0})}, {2, glow(tau, {0, 1, 0})}, {8, glow(tau, {1, 0, 0})}}),
             look({-5, 2, 2}, {0, 2, 2}));
         const glm::dvec4 seen = Raycaster(scene).trace({{-5, 2, 2}, {1, 0, 0}});
         EXPECT_EQ(seen.a, 1.0);
@@ -146,15 +152,18 @@ TEST(Raycast, HugeExtinctionIsOpaqueAndShowsTheFirstColour) {
 
 TEST(Raycast, ExtinctionThatIsNotFiniteIsRefused) {
     const double inf = std::numeric_limits<double>::infinity();
-    EXPECT_THROW(Raycaster(scene_of(ramp_x(3), transfer({{0, glow(inf)}}), look({-5, 2, 2}, {0, 2, 2}))),
-                 Error);
+    EXPECT_THROW(
+        Raycaster(scene_of(ramp_x(3), transfer({{0, glow(inf)}}), look({-5, 2, 2}, {0, 2, 2}))),
+        Error);
 }
 
 TEST(Raycast, ZeroOpacityLeavesTheBackground) {
-    RaycastScene scene = scene_of(waves_volume(), transfer({{0, glow(0)}}), look({5, 5, 40}, {5, 5, 5}));
+    RaycastScene scene =
+        scene_of(waves_volume(), transfer({{0, glow(0)}}), look({5, 5, 40}, {5, 5, 5}));
     scene.background = {0.25, 0.5, 0.75, 0.5};
     const Image image = Raycaster(scene).image();
-    for (const glm::vec4& pixel : image.rgba32f()) EXPECT_EQ(pixel, glm::vec4(0.125, 0.25, 0.375, 0.5));
+    for (const glm::vec4& pixel : image.rgba32f())
+        EXPECT_EQ(pixel, glm::vec4(0.125, 0.25, 0.375, 0.5));
 }
 
 TEST(Raycast, SplittingATransferFunctionByPointsOnItsLinesChangesNothing) {
@@ -170,7 +179,8 @@ TEST(Raycast, SplittingATransferFunctionByPointsOnItsLinesChangesNothing) {
     }
     fine->one.points.push_back(coarse->one.points.back());
     const CameraPtr camera = look({30, 17, 22}, {5, 5, 5});
-    const Raycaster a(scene_of(waves_volume(), coarse, camera)), b(scene_of(waves_volume(), fine, camera));
+    const Raycaster a(scene_of(waves_volume(), coarse, camera)),
+        b(scene_of(waves_volume(), fine, camera));
     for (double y = 0.5; y < 16; ++y)
         for (double x = 0.5; x < 16; ++x) {
             const Ray ray = camera->ray(x, y, 16, 16);
@@ -224,9 +234,12 @@ TEST(Raycast, SphereIsosurfaceIsWhereTheSphereIs) {
     // which falls with the square of the spacing.
     auto error_at = [](std::int64_t n) {
         const double h = 2.0 / double(n - 1), radius = 0.7;
-        const auto volume = make_volume({n, n, n}, ScalarType::f64, [=](auto x, auto y, auto z) {
-            return radius - glm::length(glm::dvec3(x, y, z) * h - 1.0);
-        }, glm::dvec3(h));
+        const auto volume = make_volume(
+            {n, n, n}, ScalarType::f64,
+            [=](auto x, auto y, auto z) {
+                return radius - glm::length(glm::dvec3(x, y, z) * h - 1.0);
+            },
+            glm::dvec3(h));
         // White headlight without specular: brightness gives |cos| of the angle at the hit.
         RaycastScene scene = scene_of(volume, transfer({{0, glow(1)}}), look({1, 1, 9}, {1, 1, 1}));
         scene.compositing = Compositing::isosurface;
@@ -285,14 +298,15 @@ TEST(Raycast, IsosurfaceIsTheFirstRootOfTheCubics) {
 TEST(Raycast, MaximumIsThatOfTheCubicNotOfItsSamples) {
     // One cell, a saddle: along the diagonal between its two low edges the value is 2 x (1 - x),
     // with the maximum 1/2 inside and 0 at both ends.
-    const auto volume = make_volume({2, 2, 2}, ScalarType::f64, [](auto x, auto y, auto) {
-        return x == y ? 1.0 : 0.0;
-    });
+    const auto volume = make_volume({2, 2, 2}, ScalarType::f64,
+                                    [](auto x, auto y, auto) { return x == y ? 1.0 : 0.0; });
     RaycastScene scene = scene_of(volume, nullptr, look({-4, 5, 0.5}, {0.5, 0.5, 0.5}));
     scene.compositing = Compositing::mip;
     // Opacity equals the value for a reference length of 1: tau = -ln(1 - v) at a few points.
-    scene.transfer = transfer({{0, glow(0)}, {0.4, glow(extinction_of(0.4, 1))},
-                               {0.5, glow(extinction_of(0.5, 1))}, {1, glow(extinction_of(0.5, 1))}});
+    scene.transfer = transfer({{0, glow(0)},
+                               {0.4, glow(extinction_of(0.4, 1))},
+                               {0.5, glow(extinction_of(0.5, 1))},
+                               {1, glow(extinction_of(0.5, 1))}});
     const glm::dvec3 direction = glm::normalize(glm::dvec3(1, -1, 0));
     const glm::dvec4 seen = Raycaster(scene).trace({{-4, 5, 0.5}, direction});
     EXPECT_NEAR(seen.a, 0.5, 1e-15);
@@ -322,7 +336,8 @@ TEST(Raycast, TurningTheVolumeIsTurningTheCameraTheOtherWay) {
     auto moved = [&](glm::dvec3 p, double w) { return glm::dvec3(turn * glm::dvec4(p, w)); };
     const glm::dvec3 eye(30, 17, 22), target(5, 4, 8), up(0, 1, 0);
     for (bool shading : {false, true})
-        for (Compositing compositing : {Compositing::emission_absorption, Compositing::isosurface}) {
+        for (Compositing compositing :
+             {Compositing::emission_absorption, Compositing::isosurface}) {
             RaycastScene scene = scene_of(straight, bumps(), look(eye, target, up));
             scene.shading = shading;
             scene.compositing = compositing;
@@ -346,19 +361,23 @@ TEST(Raycast, ExtremeWorldsGiveTheSamePicture) {
     for (double s : {1e9, 1e-9}) {
         auto scaled = std::make_shared<TransferFunction>(*bumps());
         for (Point& p : scaled->one.points) p.emission /= s;
-        const VolumePtr volume = with_matrix(waves_volume(), glm::scale(glm::dmat4(1.0), glm::dvec3(s)));
+        const VolumePtr volume =
+            with_matrix(waves_volume(), glm::scale(glm::dmat4(1.0), glm::dvec3(s)));
         const CameraPtr far = look(camera->eye * s, camera->target * s);
         const Raycaster caster(scene_of(volume, scaled, far));
         for (double y = 0.5; y < 16; ++y)
             EXPECT_LT(largest_difference(plain.trace(camera->ray(7.5, y, 16, 16)),
-                                         caster.trace(far->ray(7.5, y, 16, 16))), 1e-11);
+                                         caster.trace(far->ray(7.5, y, 16, 16))),
+                      1e-11);
     }
 }
 
 TEST(Raycast, NearestIsConstantAroundEachVoxel) {
     // Extinction equals the voxel's value; along x the pieces are 1/2, 1, 1, ..., 1/2 long.
-    const auto volume = make_volume({4, 3, 3}, ScalarType::u8, [](auto x, auto, auto) { return x * x; });
-    RaycastScene scene = scene_of(volume, transfer({{0, glow(0)}, {10, glow(1)}}), look({-5, 1, 1}, {0, 1, 1}));
+    const auto volume =
+        make_volume({4, 3, 3}, ScalarType::u8, [](auto x, auto, auto) { return x * x; });
+    RaycastScene scene =
+        scene_of(volume, transfer({{0, glow(0)}, {10, glow(1)}}), look({-5, 1, 1}, {0, 1, 1}));
     scene.reconstruction = Reconstruction::nearest;
     const double depth = 0.1 * (0.5 * 0 + 1 + 4 + 0.5 * 9);
     EXPECT_NEAR(Raycaster(scene).trace({{-5, 1.1, 0.9}, {1, 0, 0}}).a, -std::expm1(-depth), 1e-14);
@@ -384,11 +403,14 @@ TEST(Raycast, TricubicReproducesQuadraticsWhereTrilinearDoesNot) {
 
 TEST(Raycast, GradientsOfARampAreExactWithAnyStencilAndSpacing) {
     const glm::dvec3 spacing(0.5, 2, 10), slope(3, -1, 0.25);
-    const auto volume = make_volume({6, 6, 6}, ScalarType::f64, [=](auto x, auto y, auto z) {
-        return glm::dot(slope, glm::dvec3(x, y, z) * spacing);
-    }, spacing);
-    for (auto stencil : {GradientStencil::central, GradientStencil::sobel, GradientStencil::isotropic})
-        for (auto kernel : {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic}) {
+    const auto volume = make_volume(
+        {6, 6, 6}, ScalarType::f64,
+        [=](auto x, auto y, auto z) { return glm::dot(slope, glm::dvec3(x, y, z) * spacing); },
+        spacing);
+    for (auto stencil :
+         {GradientStencil::central, GradientStencil::sobel, GradientStencil::isotropic})
+        for (auto kernel :
+             {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic}) {
             const Field field(volume, 0, kernel, stencil, false);
             EXPECT_LT(glm::length(field.gradient({2.5, 2.3, 2.8}) - slope), 1e-12);
         }
@@ -396,13 +418,15 @@ TEST(Raycast, GradientsOfARampAreExactWithAnyStencilAndSpacing) {
 
 TEST(Raycast, ModulationScalesTheExtinctionByASmoothStepOfTheSlope) {
     // A ramp of slope 1/2 per world length: smoothstep(0, 1, 1/2) = 1/2 in the interior.
-    const auto volume = make_volume({11, 5, 5}, ScalarType::f64, [](auto x, auto, auto) { return double(x); },
-                                    glm::dvec3(2));
-    RaycastScene scene = scene_of(volume, transfer({{3, glow(0)}, {3, glow(0.3)}, {7, glow(0.3)}, {7, glow(0)}}),
-                                  look({-5, 4, 4}, {0, 4, 4}));
+    const auto volume = make_volume(
+        {11, 5, 5}, ScalarType::f64, [](auto x, auto, auto) { return double(x); }, glm::dvec3(2));
+    RaycastScene scene =
+        scene_of(volume, transfer({{3, glow(0)}, {3, glow(0.3)}, {7, glow(0.3)}, {7, glow(0)}}),
+                 look({-5, 4, 4}, {0, 4, 4}));
     scene.gradient_modulation = {0, 1};
     scene.step = 0.01;
-    EXPECT_NEAR(Raycaster(scene).trace({{-5, 4, 4}, {1, 0, 0}}).a, -std::expm1(-0.5 * 0.3 * 8), 1e-3);
+    EXPECT_NEAR(Raycaster(scene).trace({{-5, 4, 4}, {1, 0, 0}}).a, -std::expm1(-0.5 * 0.3 * 8),
+                1e-3);
 }
 
 TEST(Raycast, TwoDimensionalTransferFunctionsSeeValueAndSlope) {
@@ -432,10 +456,12 @@ TEST(Raycast, ColourVolumesKeepTheirColours) {
     }
     const auto volume = std::make_shared<DenseVolume>(desc, std::move(voxels));
     const double luma = 0.2126 * 255 + 0.7152 * 51;
-    const Raycaster caster(scene_of(volume, transfer({{0, glow(0)}, {255, glow(0.5)}}),
-                                    look({2, 2, 20}, {2, 2, 2})));
+    const Raycaster caster(
+        scene_of(volume, transfer({{0, glow(0)}, {255, glow(0.5)}}), look({2, 2, 20}, {2, 2, 2})));
     const double alpha = -std::expm1(-4 * 0.5 * luma / 255 * 127 / 255);
-    EXPECT_LT(largest_difference(caster.trace({{2, 2, 20}, {0, 0, -1}}), {alpha, 0.2 * alpha, 0, alpha}), 1e-12);
+    EXPECT_LT(
+        largest_difference(caster.trace({{2, 2, 20}, {0, 0, -1}}), {alpha, 0.2 * alpha, 0, alpha}),
+        1e-12);
 }
 
 TEST(Raycast, InvalidVoxelsAreLeftOutAndTheirNeighboursRenormalised) {
@@ -445,20 +471,23 @@ TEST(Raycast, InvalidVoxelsAreLeftOutAndTheirNeighboursRenormalised) {
     const auto speck = make_volume({9, 9, 9}, ScalarType::f32, [=](auto x, auto y, auto z) {
         return x == 4 && y == 4 && z == 4 ? nan : 1.0;
     });
-    const auto slab = make_volume({9, 9, 9}, ScalarType::f32, [=](auto, auto, auto z) {
-        return z == 4 || z == 5 ? nan : 1.0;
-    });
+    const auto slab = make_volume({9, 9, 9}, ScalarType::f32,
+                                  [=](auto, auto, auto z) { return z == 4 || z == 5 ? nan : 1.0; });
     for (Mode mode : {Mode::cells, Mode::steps})
         for (bool shading : {false, true}) {
-            RaycastScene scene = scene_of(speck, transfer({{0, glow(0)}, {1, glow(0.2)}}), look({4, 4, 30}, {4, 4, 4}));
+            RaycastScene scene = scene_of(speck, transfer({{0, glow(0)}, {1, glow(0.2)}}),
+                                          look({4, 4, 30}, {4, 4, 4}));
             scene.mode = mode;
             scene.shading = shading;
             scene.lights.ambient = 1;
             const Ray ray{{4.3, 4.2, 30}, {0, 0, -1}};
-            EXPECT_LT(largest_difference(Raycaster(scene).trace(ray), glm::dvec4(-std::expm1(-1.6))), 1e-12);
+            EXPECT_LT(
+                largest_difference(Raycaster(scene).trace(ray), glm::dvec4(-std::expm1(-1.6))),
+                1e-12);
             scene.volume = slab;
-            EXPECT_LT(largest_difference(Raycaster(scene).trace(ray), glm::dvec4(-std::expm1(-1.4))),
-                      mode == Mode::cells ? 1e-12 : 5e-3);
+            EXPECT_LT(
+                largest_difference(Raycaster(scene).trace(ray), glm::dvec4(-std::expm1(-1.4))),
+                mode == Mode::cells ? 1e-12 : 5e-3);
         }
 }
 
@@ -472,8 +501,10 @@ TEST(Raycast, MaskedVoxelsAreInvalidToo) {
     const auto all_masked = std::make_shared<DenseVolume>(desc, std::move(voxels), std::move(mask));
     for (auto compositing : {Compositing::emission_absorption, Compositing::mip, Compositing::x_ray,
                              Compositing::isosurface})
-        for (auto kernel : {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic}) {
-            RaycastScene scene = scene_of(all_masked, transfer({{0, glow(1)}}), look({1, 1, 9}, {1, 1, 1}));
+        for (auto kernel :
+             {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic}) {
+            RaycastScene scene =
+                scene_of(all_masked, transfer({{0, glow(1)}}), look({1, 1, 9}, {1, 1, 1}));
             scene.compositing = compositing;
             scene.reconstruction = kernel;
             EXPECT_EQ(Raycaster(scene).trace({{1.2, 1.1, 9}, {0, 0, -1}}), glm::dvec4(0.0));
@@ -483,12 +514,13 @@ TEST(Raycast, MaskedVoxelsAreInvalidToo) {
 TEST(Raycast, ClosedFormIsIntegratedInsteadOfTheVoxels) {
     class Ball final : public Volume {
       public:
-        Ball() : Volume([] {
-            VolumeDesc d;
-            d.dims = {3, 3, 3};
-            d.type = ScalarType::f64;
-            return d;
-        }()) {
+        Ball()
+            : Volume([] {
+                  VolumeDesc d;
+                  d.dims = {3, 3, 3};
+                  d.type = ScalarType::f64;
+                  return d;
+              }()) {
             form_.value = [](glm::dvec3 p) { return 0.9 - glm::length(p - 1.0); };
             form_.gradient = [](glm::dvec3 p) { return -glm::normalize(p - 1.0); };
         }
@@ -508,7 +540,8 @@ TEST(Raycast, ClosedFormIsIntegratedInsteadOfTheVoxels) {
     scene.closed_form = true;
     scene.step = 0.001;
     const double x = 0.3, half = std::sqrt(0.81 - x * x);
-    EXPECT_NEAR(Raycaster(scene).trace({{1 + x, 1, 9}, {0, 0, -1}}).a, -std::expm1(-2 * half), 1e-3);
+    EXPECT_NEAR(Raycaster(scene).trace({{1 + x, 1, 9}, {0, 0, -1}}).a, -std::expm1(-2 * half),
+                1e-3);
 
     scene.compositing = Compositing::isosurface;
     scene.shading = true;
@@ -525,20 +558,25 @@ TEST(Raycast, EveryScalarTypeIsDrawn) {
         const auto volume = make_volume({4, 4, 4}, ScalarType(i), [](auto x, auto y, auto z) {
             return double(x + 4 * y + 16 * z);
         });
-        const Raycaster caster(scene_of(volume, transfer({{0, glow(0)}, {63, glow(1)}}), look({1.5, 1.5, 20}, {1.5, 1.5, 1})));
+        const Raycaster caster(scene_of(volume, transfer({{0, glow(0)}, {63, glow(1)}}),
+                                        look({1.5, 1.5, 20}, {1.5, 1.5, 1})));
         // Along z at x = y = 1.5 the value goes from 7.5 to 55.5.
-        EXPECT_NEAR(caster.trace({{1.5, 1.5, 20}, {0, 0, -1}}).a, -std::expm1(-3 * 31.5 / 63), 1e-13);
+        EXPECT_NEAR(caster.trace({{1.5, 1.5, 20}, {0, 0, -1}}).a, -std::expm1(-3 * 31.5 / 63),
+                    1e-13);
     }
 }
 
 TEST(Raycast, VolumesOfOneVoxelAndNoneAreDrawn) {
     const CameraPtr camera = look({0, 0, 9}, {0, 0, 0});
-    for (auto kernel : {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic})
+    for (auto kernel :
+         {Reconstruction::nearest, Reconstruction::trilinear, Reconstruction::tricubic})
         for (Mode mode : {Mode::automatic, Mode::steps}) {
-            RaycastScene scene = scene_of(constant({1, 1, 1}, 3), transfer({{0, glow(0.7)}}), camera);
+            RaycastScene scene =
+                scene_of(constant({1, 1, 1}, 3), transfer({{0, glow(0.7)}}), camera);
             scene.reconstruction = kernel;
             scene.mode = mode;
-            EXPECT_NEAR(Raycaster(scene).trace({{0.2, 0.1, 9}, {0, 0, -1}}).a, -std::expm1(-0.7), 1e-13);
+            EXPECT_NEAR(Raycaster(scene).trace({{0.2, 0.1, 9}, {0, 0, -1}}).a, -std::expm1(-0.7),
+                        1e-13);
             EXPECT_EQ(Raycaster(scene).trace({{0.6, 0.1, 9}, {0, 0, -1}}).a, 0.0);
             scene.volume = constant({0, 4, 4}, 3);
             EXPECT_EQ(Raycaster(scene).trace({{0, 0.1, 9}, {0, 0, -1}}).a, 0.0);
@@ -564,7 +602,8 @@ TEST(Raycast, StopsWhenAsked) {
     scene.step = 1e-3;
     std::stop_source source;
     const Raycaster caster(scene);
-    EXPECT_THROW(caster.image(source.get_token(), [&](double) { source.request_stop(); }), Cancelled);
+    EXPECT_THROW(caster.image(source.get_token(), [&](double) { source.request_stop(); }),
+                 Cancelled);
 }
 
 TEST(Raycast, CellsAreRefusedWhereTheyAreNotExact) {

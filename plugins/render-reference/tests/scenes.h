@@ -40,7 +40,8 @@ inline VolumePtr with_matrix(const VolumePtr& volume, const glm::dmat4& index_to
 
 // A smooth field with curvature in every direction, values about 0 to 1.
 inline double waves(glm::dvec3 p) {
-    return 0.5 + 0.25 * std::sin(0.7 * p.x + 0.3 * p.y) + 0.25 * std::cos(0.5 * p.z - 0.4 * p.x * p.y / 8);
+    return 0.5 + 0.25 * std::sin(0.7 * p.x + 0.3 * p.y) +
+           0.25 * std::cos(0.5 * p.z - 0.4 * p.x * p.y / 8);
 }
 
 inline VolumePtr waves_volume(Index3 dims = {12, 11, 10}) {
@@ -51,8 +52,12 @@ inline VolumePtr waves_volume(Index3 dims = {12, 11, 10}) {
 
 // Several bumps with colours of their own: kinks, jumps and smooth stretches.
 inline TransferPtr bumps() {
-    return transfer({{0.1, glow(0)}, {0.2, glow(0.8, {1, 0.2, 0.1})}, {0.3, glow(0)},
-                     {0.55, glow(0.1, {0, 1, 0})}, {0.6, glow(2.0, {0.2, 0.3, 1})}, {0.65, glow(0)},
+    return transfer({{0.1, glow(0)},
+                     {0.2, glow(0.8, {1, 0.2, 0.1})},
+                     {0.3, glow(0)},
+                     {0.55, glow(0.1, {0, 1, 0})},
+                     {0.6, glow(2.0, {0.2, 0.3, 1})},
+                     {0.65, glow(0)},
                      {0.8, glow(0.4, {1, 1, 0})}});
 }
 
