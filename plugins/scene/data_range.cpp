@@ -24,7 +24,12 @@ ValueRange range_of_bricks(const Bricks& bricks, const std::stop_token& stop) {
     for (int z = 0; z < n.z; ++z)
         for (int y = 0; y < n.y; ++y) {
             check_stop(stop);
-            for (int x = 0; x < n.x; ++x) all = join(all, bricks.info({0, {x, y, z}}).range);
+            for (int x = 0; x < n.x; ++x) {
+                // A brick without a finite value says {0, 0}. So does one of zeros, but then the
+                // layer that bricks share brings the zero in with its neighbours.
+                const ValueRange range = bricks.info({0, {x, y, z}}).range;
+                if (range != ValueRange{}) all = join(all, range);
+            }
         }
     return all.min > all.max ? ValueRange{} : all;
 }

@@ -110,6 +110,19 @@ TEST(Transfer, TakesRangeAndBoundariesOfBricks) {
     EXPECT_EQ(r.measured("range_min"), 0);
     EXPECT_EQ(r.measured("range_max"), 207);
     EXPECT_LT(r.measured("boundary_1"), r.measured("boundary_3"));
+    // Bricks without a finite value say nothing of the range; bricks of zeros do.
+    auto half_known = make_volume({64, 16, 16}, ScalarType::f32, [](auto x, auto, auto) {
+        return x < 32 ? std::nan("") : 100.0 + double(x);
+    });
+    auto half_zero = make_volume({64, 16, 16}, ScalarType::f32, [](auto x, auto, auto) {
+        return x < 32 ? 0.0 : 100.0 + double(x);
+    });
+    auto smallest = [](VolumePtr v) {
+        return run("{}", make_dense_pyramid(v, glm::ivec3(8), PyramidFilter::subsample))
+            .measured("range_min");
+    };
+    EXPECT_EQ(smallest(half_known), 132);
+    EXPECT_EQ(smallest(half_zero), 0);
     for (Index3 dims : {Index3(0), Index3(1)}) {
         auto small = make_volume(dims, ScalarType::i16, [](auto...) { return 5; });
         for (const char* set : {"{}", "{preset: materials}"})
