@@ -12,6 +12,7 @@
 #include <new>
 
 #include "core/base/meter.h"
+#include "core/base/tsan.h"
 #include "core/gpu/thread.h"
 #include "core/graph/result_key.h"
 
@@ -295,6 +296,7 @@ void Run::start(int node) {
     ++in_flight_;
     report_state(node);
     running_.push_back(node);
+    tsan::before_tasks();
     if (plan_.nodes[std::size_t(node)].type->thread == NodeType::Thread::opengl)
         // Loops of a drawing node get an arena that only the OpenGL thread enters, so that it
         // always runs its own part itself.
@@ -304,6 +306,7 @@ void Run::start(int node) {
         });
     else
         arena_.enqueue([this, node] {
+            tsan::InTask in_task;
             execute(node);
             task_done();
         });
