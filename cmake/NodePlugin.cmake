@@ -70,7 +70,17 @@ function(voxloom_discover_tests target)
   if(label STREQUAL "unit")
     add_dependencies(unit-tests ${target})
   endif()
+  # What is not ours, and why, stands in cmake/*.supp.
+  set(sanitizer)
+  if(VOXLOOM_SANITIZE MATCHES "thread")
+    set(sanitizer ENVIRONMENT_MODIFICATION
+        "TSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/tsan.supp second_deadlock_stack=1")
+  elseif(VOXLOOM_SANITIZE MATCHES "address")
+    set(sanitizer ENVIRONMENT_MODIFICATION
+        "LSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/lsan.supp print_suppressions=0")
+  endif()
   gtest_discover_tests(${target} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
     DISCOVERY_TIMEOUT 60 TEST_PREFIX "${target}."
-    PROPERTIES LABELS ${label} TIMEOUT 300 ENVIRONMENT "VOXLOOM_PLUGIN_PATH=${VOXLOOM_PLUGIN_DIR}")
+    PROPERTIES LABELS ${label} TIMEOUT 300 ENVIRONMENT "VOXLOOM_PLUGIN_PATH=${VOXLOOM_PLUGIN_DIR}"
+               ${sanitizer})
 endfunction()

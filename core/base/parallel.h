@@ -24,18 +24,18 @@ void parallel_for(std::int64_t begin, std::int64_t end, std::int64_t grain, cons
         return;
     }
     Meter* meter = Meter::current();
+    auto task = [&](const tbb::blocked_range<std::int64_t>& range) {
+        tsan::InTask in_task;
+        MeterScope charge(meter);
+        check_stop(stop);
+        body(range.begin(), range.end());
+    };
     struct Joined {
         ~Joined() { tsan::after_tasks(); }
     } joined;
     tsan::before_tasks();
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(tbb::blocked_range<std::int64_t>(begin, end, std::size_t(grain)),
-                          [&](const tbb::blocked_range<std::int64_t>& range) {
-                              tsan::InTask in_task;
-                              MeterScope charge(meter);
-                              check_stop(stop);
-                              body(range.begin(), range.end());
-                          });
+        tbb::parallel_for(tbb::blocked_range<std::int64_t>(begin, end, std::size_t(grain)), task);
     });
 }
 

@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "core/base/error.h"
-#include "core/base/parallel.h"
+#include "core/base/tsan.h"
 #include "tests/support/volumes.h"
 
 namespace voxloom {
@@ -483,11 +483,15 @@ TEST(BrickCache, LoopsInsideDecodersInsideLoopsDoNotWaitForThemselves) {
     for (int threads : {1, 2, 4}) {
         tbb::global_control control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
         BrickCache cache(1 << 20);
-        tbb::parallel_for(0, 200, [&](int i) {
+        auto read_one = [&](int i) {
+            tsan::InTask in_task;
             std::mt19937 random(static_cast<unsigned>(i / 2));
             const BrickId id = random_brick(bricks->desc(), random);
             bricks->expect_right(id, *cache.get(bricks, id));
-        });
+        };
+        tsan::before_tasks();
+        tbb::parallel_for(0, 200, read_one);
+        tsan::after_tasks();
     }
 }
 
