@@ -39,6 +39,11 @@ Hash key(std::string_view what, const Hash& a, const Hash& b) {
     return Hasher().text(what).hash(a).hash(b).finish();
 }
 
+// Premultiplied.
+glm::vec4 background(const S& s) {
+    return glm::vec4(glm::dvec3(s.background) * s.background.a, s.background.a);
+}
+
 // --- what is prepared from the data ------------------------------------------------------------
 
 // The source as a dense volume in memory, kept for as long as the source lives.
@@ -421,7 +426,7 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
     program.set("saturated", float(1 - s.early_termination));
     program.set("iso_level", float((s.iso_value - p.range.min) / extent));
     program.set("iso_color", glm::vec3(color_of(scene.transfer->one.at(s.iso_value))));
-    program.set("background", glm::vec4(glm::dvec3(s.background) * s.background.a, s.background.a));
+    program.set("background", background(s));
     set_lights(program, scene.lights ? *scene.lights : Lights{}, *scene.camera, view);
 }
 
@@ -443,11 +448,26 @@ struct Target {
     gpu::Object framebuffer, vertices;
 };
 
-// Draws all rows, in batches that end often enough for a cancellation to be prompt.
-void draw(const gpu::Program& program, const Target& target, const View& view, Evaluation& ev) {
+// A target of the size last asked for is kept. Only ever used on the OpenGL thread.
+const Target& target_of(glm::ivec2 size) {
+    static Target* last = nullptr;
+    if (!last || last->size != size) {
+        delete last;
+        last = nullptr;
+        last = new Target(size);
+    }
+    return *last;
+}
+
+// Draws what the volume can cover, in batches of rows that end often enough for a cancellation to be
+// prompt; the rest is background.
+void draw(const gpu::Program& program, const Target& target, const View& view, glm::vec4 background,
+          Evaluation& ev) {
     constexpr double kBatchSeconds = 0.03;
+    const std::int64_t begin = wall_ns();
     const bool coarse = target.size != view.size;
-    program.set("pixel_scale", glm::vec2(view.size) / glm::vec2(target.size));
+    const glm::dvec2 scale = glm::dvec2(view.size) / glm::dvec2(target.size);
+    program.set("pixel_scale", glm::vec2(scale));
     program.set("square", coarse ? 1.0f : float(view.square));
     program.set("square_reach", coarse ? 0.0f : float(view.square_reach()));
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
@@ -456,26 +476,35 @@ void draw(const gpu::Program& program, const Target& target, const View& view, E
     glViewport(0, 0, target.size.x, target.size.y);
     glDisable(GL_BLEND);
     glDisable(GL_DEPTH_TEST);
+    glDisable(GL_SCISSOR_TEST);
+    const glm::vec4 nothing(0.0f);
+    glClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, 0, &background[0]);
+    glClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, 1, &nothing[0]);
     glEnable(GL_SCISSOR_TEST);
-    int rows = std::max(64, target.size.y / 8);
-    for (int y = 0; y < target.size.y;) {
+    // Whole tiles of the software rasteriser.
+    constexpr int kTile = 64;
+    const glm::ivec2 lo = glm::ivec2(glm::floor(glm::dvec2(view.bounds) / scale));
+    const glm::ivec2 hi = glm::min(
+        glm::ivec2(glm::ceil(glm::dvec2(view.bounds.z, view.bounds.w) / scale)), target.size);
+    int rows = std::max(kTile, (hi.y - lo.y) / 4 / kTile * kTile);
+    for (int y = lo.y; y < hi.y;) {
         check_stop(ev.stop());
-        const int n = std::min(rows, target.size.y - y);
+        const int n = std::min(rows - y % kTile, hi.y - y);
         const std::int64_t start = wall_ns();
-        glScissor(0, y, target.size.x, n);
+        glScissor(lo.x, y, hi.x - lo.x, n);
         glDrawArrays(GL_TRIANGLES, 0, 3);
         glFinish();
         const double seconds = double(wall_ns() - start) * 1e-9;
-        ev.add_draw_seconds(seconds);
         y += n;
-        // Whole tiles of the software rasteriser; never more than four times the last batch, since
-        // the next rows may be dearer.
-        double next = double(n) * std::min(kBatchSeconds / std::max(seconds, 1e-6), 4.0);
-        rows = std::max(int(next) / 64 * 64, std::min(64, target.size.y));
+        // Never more than four times the last batch, since the next rows may be dearer.
+        const double next = double(n) * std::min(kBatchSeconds / std::max(seconds, 1e-6), 4.0);
+        rows = std::max(int(next) / kTile * kTile, kTile);
         ev.progress(0.8 + 0.2 * double(y) / double(target.size.y), "drawing");
     }
+    glFinish();
     glDisable(GL_SCISSOR_TEST);
     gpu::check_errors("drawing");
+    ev.add_draw_seconds(double(wall_ns() - begin) * 1e-9);
 }
 
 std::shared_ptr<Image> read_back(const Target& target) {
@@ -516,8 +545,7 @@ ImagePtr enlarged(const Image& coarse, glm::ivec2 size) {
 
 ImagePtr only_background(const S& s) {
     auto image = std::make_shared<Image>(s.size, Image::Format::rgba32f);
-    const glm::vec4 c(glm::dvec3(s.background) * s.background.a, s.background.a);
-    std::ranges::fill(image->rgba32f(), c);
+    std::ranges::fill(image->rgba32f(), background(s));
     return image;
 }
 
@@ -557,11 +585,11 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
 
     if (ev.wants_provisional() && s.size.x * s.size.y > 128 * 128) {
         Target coarse(glm::max(s.size / 4, glm::ivec2(1)));
-        draw(*program, coarse, view, ev);
+        draw(*program, coarse, view, background(s), ev);
         ev.provisional("image", enlarged(*read_back(coarse), s.size));
     }
-    Target target(s.size);
-    draw(*program, target, view, ev);
+    const Target& target = target_of(s.size);
+    draw(*program, target, view, background(s), ev);
     std::shared_ptr<Image> image = read_back(target);
     count_samples(target, ev);
     Keep::instance().shrink(s.gpu_bytes);

@@ -62,6 +62,28 @@ View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 pixels, doub
         slope = {-0.5 * size.x * pixel, pixel, 0.5 * size.y * pixel, -pixel};
     near_plane = (std::max(camera.near, 0.0) - depth) / plane_distance;
 
+    // The picture of the box is inside of that of its corners; all of it where one is behind the eye.
+    glm::dvec2 lo(size), hi(0);
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::dvec3 at(corner & 1 ? box.hi.x : box.lo.x, corner & 2 ? box.hi.y : box.lo.y,
+                            corner & 4 ? box.hi.z : box.lo.z);
+        const glm::dvec3 from_eye = to_world * (at - middle) - from_middle;
+        const double away = perspective ? glm::dot(from_eye, f) : 1.0;
+        if (away < 1e-6 * diagonal) {
+            lo = glm::dvec2(0);
+            hi = glm::dvec2(size);
+            break;
+        }
+        const glm::dvec2 at_pixel = 0.5 * glm::dvec2(size) + glm::dvec2(glm::dot(from_eye, r), -glm::dot(from_eye, u)) /
+                                                                 (away * pixel);
+        lo = glm::min(lo, at_pixel);
+        hi = glm::max(hi, at_pixel);
+    }
+    // One pixel more, for rounding.
+    lo = glm::clamp(lo - 1.0, glm::dvec2(0), glm::dvec2(size));
+    hi = glm::clamp(hi + 1.0, lo, glm::dvec2(size));
+    bounds = glm::ivec4(glm::floor(lo), glm::ceil(hi));
+
     for (int side : {4, 2}) {
         constexpr int kMostReach = 3;  // wider blocks would be seen too often
         double widest = 0;

@@ -36,6 +36,9 @@ struct View {
     glm::dvec3 middle_world;
     double smallest_spacing = 1; // gradient_to_world is per this length
 
+    // Pixels that the volume can cover: from xy to below zw.
+    glm::ivec4 bounds{0};
+
     void set(const gpu::Program& program) const;
 
   private:
