@@ -104,15 +104,19 @@ std::optional<FieldSource> provided_source(const Value& value, const SourceReque
 
 const Module& dense_module() { return kDense; }
 
+void check_fits_texture(const VolumeDesc& desc) {
+    const int limit = context_info().max_texture_3d;
+    if (desc.dims.x > limit || desc.dims.y > limit || desc.dims.z > limit)
+        fail("a volume of {} does not fit into one texture (this OpenGL driver ends at {} a side); "
+             "crop it or draw a coarser level of it", summary(desc), limit);
+}
+
 VoxelSource upload_dense(const Volume& volume, int component, const std::stop_token& stop,
                          std::uint64_t& bytes) {
     const VolumeDesc& desc = volume.desc();
     const std::byte* data = volume.data();
     const glm::ivec3 dims(desc.dims);
-    const int limit = context_info().max_texture_3d;
-    if (desc.dims.x > limit || desc.dims.y > limit || desc.dims.z > limit)
-        fail("a volume of {} does not fit into one texture (this OpenGL driver ends at {} a side); "
-             "crop it or draw a coarser level of it", summary(desc), limit);
+    check_fits_texture(desc);
 
     Layout l;
     l.wide = bytes_of(desc.type) > 2;
@@ -146,9 +150,10 @@ VoxelSource upload_dense(const Volume& volume, int component, const std::stop_to
         if (!std::isfinite(l.scale))
             fail("the values of this volume span more than a double can hold");
     } else {
-        // 8-bit values times 257, or the offset of a signed type: every integer has its own texel.
+        // Every integer has its own texel: 8-bit values times 257; signed ones from the smallest on, as
+        // small texels are interpolated with small absolute error.
         auto [lo, hi] = limits_of(desc.type);
-        l.offset = lo;
+        l.offset = lo < 0 ? std::clamp(value_range(volume, stop).min, lo, hi) : lo;
         l.scale = hi - lo;
     }
 

@@ -52,6 +52,9 @@ void register_source_provider(std::string name, SourceProvider provider);
 // The first provider's answer, in order of name. [OpenGL thread]
 std::optional<FieldSource> provided_source(const Value& value, const SourceRequest& request);
 
+// Throws Error when a volume exceeds what one 3-D texture can hold here.
+void check_fits_texture(const VolumeDesc& desc);
+
 // The dense one: a volume in one 3-D texture. Integers of up to 16 bits keep every value exactly in
 // R16; wider types and floats become R32F over their finite range, mapped in double. Voxels that are
 // not finite or not valid take a second channel. `bytes` receives what was uploaded.

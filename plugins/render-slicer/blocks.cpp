@@ -96,12 +96,18 @@ BlockRanges block_ranges(const Volume& volume, int component, int size, int reac
             }
         }, stop);
     });
-    if (cubic)
-        for (glm::vec2& r : out.ranges)
-            if (r.x < r.y) {
-                float middle = 0.5f * (r.x + r.y), half = float(kCubicOvershoot) * 0.5f * (r.y - r.x);
-                r = {middle - half, middle + half};
-            }
+    glm::vec2 all(inf, -inf);
+    for (glm::vec2 r : out.ranges)
+        if (r.x <= r.y) all = {std::min(all.x, r.x), std::max(all.y, r.y)};
+    auto overshoot = [cubic](glm::vec2 r) {
+        if (!cubic || !(r.x < r.y)) return r;
+        const float middle = 0.5f * r.x + 0.5f * r.y;
+        const float half = float(kCubicOvershoot) * (0.5f * r.y - 0.5f * r.x);
+        return glm::vec2(middle - half, middle + half);
+    };
+    for (glm::vec2& r : out.ranges) r = overshoot(r);
+    all = overshoot(all);
+    out.all = {all.x, all.y};
     return out;
 }
 

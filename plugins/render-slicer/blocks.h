@@ -18,6 +18,7 @@ struct BlockRanges {
     int size = 8;
     glm::ivec3 grid{0};             // blocks; x fastest
     std::vector<glm::vec2> ranges;  // in the volume's values
+    ValueRange all;                 // what reconstruction can meet anywhere
     std::size_t count() const { return ranges.size(); }
 };
 BlockRanges block_ranges(const Volume& volume, int component, int size, int reach,

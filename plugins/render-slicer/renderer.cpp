@@ -193,10 +193,7 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
     find_occupancy(scene, owner, p, ev);
     if (p.seen == 0) return p;
 
-    constexpr double inf = std::numeric_limits<double>::infinity();
-    p.range = {inf, -inf};
-    for (glm::dvec2 r : p.blocks->ranges)
-        if (r.x <= r.y) p.range = {std::min(p.range.min, r.x), std::max(p.range.max, r.y)};
+    p.range = p.blocks->all;
 
     p.field = keep.get<gpu::FieldSource>(
         owner, key("source", desc.color ? -1 : s.component), [&](std::uint64_t& bytes) {
@@ -565,6 +562,8 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
     if (desc.voxels() == 0) return only_background(s);
     if (s.component >= desc.components)
         fail("component {} is asked for, but the volume has {}", s.component, desc.components);
+
+    gpu::check_fits_texture(desc);
 
     View view(*scene.camera, desc, s.size, s.slice_distance);
     if (view.planes > kMostPlanes) {
