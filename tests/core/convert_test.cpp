@@ -50,10 +50,10 @@ TEST(Convert, EveryTypeToEveryWiderOneAndBackIsTheSame) {
                                (!is_float(ScalarType(a)) && !is_float(ScalarType(b)));
             if (a == b || !exact || wide_lo > lo || wide_hi < hi) continue;
             std::vector<std::byte> there(1300 * 8), back(1300 * 8), values(1300 * 8);
-            with_type(ScalarType(a), [&](auto t) {
+            with_type(ScalarType(a), [&, lo = lo, hi = hi](auto t) {
                 auto* v = reinterpret_cast<decltype(t)*>(values.data());
                 for (int i = 0; i < 1300; ++i)
-                    v[i] = decltype(t)(lo / 2 + (hi / 2 - lo / 2) * (double(i) / 1299) * 2 * 0.999);
+                    v[i] = decltype(t)(lo + (hi - lo) * (double(i) / 1299) * 0.999);
             });
             convert(ScalarType(a), values.data(), ScalarType(b), there.data(), 1300);
             convert(ScalarType(b), there.data(), ScalarType(a), back.data(), 1300);
