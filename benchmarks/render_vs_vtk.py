@@ -3,7 +3,7 @@
 
 Every renderer gets the same voxels, transfer function and camera; the truth is reference.raycast
 (double precision, exact inside each cell). A picture's error is over red, green and blue, peak 1,
-after rounding to 8 bits, which is what VTK delivers: it cannot come below 0.0011 RMSE (58.9 dB).
+after rounding to 8 bits, which is what VTK delivers; that alone costs up to 0.0011 RMSE (58.9 dB).
 Milliseconds are medians, the GPU's work finished; only ratios between rows of one run mean
 anything.
 
