@@ -332,6 +332,7 @@ VolumeFile open_hdf5(const fs::path& path, const ReadOptions& options) {
     desc.components = axes.component < 0 ? 1 : int(extent(axes.component));
     if (desc.components < 1) fail("{} has no components", what);
     opened.steps = extent(axes.time);
+    if (opened.steps > kMostSteps) fail("{} claims {} time steps", what, opened.steps);
     std::string name = text_of(object, "name");
     desc.name = name.empty() ? set.name.substr(set.name.rfind('/') + 1) : name;
 

@@ -239,7 +239,7 @@ void check_unpacked_length(const Layout& layout, const std::stop_token& stop) {
     StoredVoxels whole;
     whole.pieces = {{layout.data, 0}};
     whole.packed = true;
-    PackedSteps(whole, layout.least_bytes, 1, 1).skip_through(layout.least_bytes, stop);
+    PackedSteps(whole, 1, 1).skip_through(layout.least_bytes, stop);
 }
 
 // The whole of what ITK reads, shared by the steps while any of them lives.
@@ -355,7 +355,7 @@ VolumeFile open_itk_file(const fs::path& given, const std::string& format) {
              image.outer.size() + 3);
     const std::int64_t steps = image.outer.empty() ? 1 : image.outer[0];
     const std::uint64_t bytes = checked_product(image.desc.dims, image.desc.voxel_bytes(), path.string());
-    if (steps > 10'000'000 || bytes > (std::uint64_t(1) << 62) / std::uint64_t(std::max<std::int64_t>(steps, 1)))
+    if (steps > kMostSteps || bytes > (std::uint64_t(1) << 62) / std::uint64_t(std::max<std::int64_t>(steps, 1)))
         fail("{}: the header claims {} time steps of {}, more than fit in 63 bits", path.string(), steps,
              human_bytes(double(bytes)));
     if (format == "nrrd")

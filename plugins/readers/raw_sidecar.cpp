@@ -106,7 +106,8 @@ RawSidecar parse_raw_sidecar(std::string_view yaml, const fs::path& path) {
         dims.wrong("must be a list of the voxels along x, y and z, and of time steps if there are any");
     desc.dims = Index3(1);
     for (std::size_t a = 0; a < dims.node.size(); ++a) {
-        std::int64_t n = dims.integer(dims.node[a], a < 3 ? 0 : 1, std::int64_t(1) << 48);
+        std::int64_t n = dims.integer(dims.node[a], a < 3 ? 0 : 1,
+                                      a < 3 ? std::int64_t(1) << 48 : kMostSteps);
         (a < 3 ? desc.dims[int(a)] : raw.steps) = n;
     }
 

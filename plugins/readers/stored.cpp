@@ -237,17 +237,16 @@ struct PackedSteps::Inflater {
     ~Inflater() { inflateEnd(&z); }
 };
 
-PackedSteps::PackedSteps(StoredVoxels stored, std::uint64_t step_bytes, std::int64_t steps,
-                         std::size_t sample_bytes)
-    : stored_(std::move(stored)), step_bytes_(step_bytes), steps_(steps),
-      sample_bytes_(sample_bytes), starts_(std::size_t(steps)) {
+PackedSteps::PackedSteps(StoredVoxels stored, std::int64_t steps, std::size_t sample_bytes)
+    : stored_(std::move(stored)), steps_(steps), sample_bytes_(sample_bytes),
+      starts_(std::size_t(steps)) {
     assert(stored_.packed && stored_.pieces.size() == 1);
 }
 
 PackedSteps::~PackedSteps() = default;
 
 void PackedSteps::read(std::int64_t step, std::span<std::byte> out, const std::stop_token& stop) {
-    assert(step >= 0 && step < steps_ && out.size() == step_bytes_);
+    assert(step >= 0 && step < steps_);
     std::lock_guard lock(mutex_);
     try {
         // From the nearest start at or before the step; `next_` is one of them.

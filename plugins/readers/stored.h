@@ -51,11 +51,11 @@ VolumePtr stored_volume(VolumeDesc desc, StoredVoxels stored, std::int64_t step,
 // step alone. Memory is that and the steps in use, never the whole file. Thread-safe.
 class PackedSteps {
   public:
-    PackedSteps(StoredVoxels stored, std::uint64_t step_bytes, std::int64_t steps,
-                std::size_t sample_bytes);
+    PackedSteps(StoredVoxels stored, std::int64_t steps, std::size_t sample_bytes);
     ~PackedSteps();
     // Unpacks `bytes` bytes and the end of the stream, keeping nothing: it is whole, or an Error.
     void skip_through(std::uint64_t bytes, const std::stop_token& stop);
+    // `out` has the bytes of one step, the same for every step.
     void read(std::int64_t step, std::span<std::byte> out, const std::stop_token& stop);
 
   private:
@@ -66,7 +66,6 @@ class PackedSteps {
     void finish(const std::stop_token& stop);
 
     StoredVoxels stored_;
-    std::uint64_t step_bytes_;
     std::int64_t steps_;
     std::size_t sample_bytes_;
     std::mutex mutex_;

@@ -110,7 +110,7 @@ void serve_stored(VolumeFile& file, StoredVoxels stored) {
         return;
     }
     const std::size_t sample_bytes = bytes_of(file.desc.type);
-    auto packed = std::make_shared<PackedSteps>(stored, step_bytes, file.steps, sample_bytes);
+    auto packed = std::make_shared<PackedSteps>(stored, file.steps, sample_bytes);
     file.volume = [desc = file.desc, packed, step_bytes](std::int64_t step) {
         return loaded_volume(desc, std::make_shared<LoadOnce>(
             step_bytes, desc.name,

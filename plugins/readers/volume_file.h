@@ -21,6 +21,8 @@
 
 namespace voxloom {
 
+inline constexpr std::int64_t kMostSteps = 10'000'000;  // more are a damaged header
+
 struct ReadOptions {
     std::string format = "auto";  // one of format_names()
     std::string dataset;          // HDF5: path inside the file; empty: the only one that fits
