@@ -171,7 +171,7 @@ VolumeDesc desc_of(Index3 dims) {
 
 TEST(WriteVolume, SlabsAreBoundedInMemoryAndCoverTheFileInOrder) {
     for (Index3 dims :
-         {Index3(40000001, 1, 1), Index3(6000, 5000, 2), Index3(500, 400, 300), Index3(1, 1, 17)}) {
+         {Index3(17000001, 1, 1), Index3(5000, 3400, 2), Index3(300, 260, 250), Index3(1, 1, 17)}) {
         TempFolder folder;
         auto volume = std::make_shared<Streamed>(desc_of(dims));
         write(volume, folder.path(), "{path: big.raw}");
