@@ -12,18 +12,21 @@ constexpr int kNodes = 10'000;
 
 // Node i takes node i-1 (a chain), or the source (a fan, gathered by every hundredth node).
 std::string graph_text(bool chain) {
-    std::string text = "voxloom: 1\nnodes:\n  - id: n0\n    type: fake.source\n    set: { size: 16 }\n";
+    std::string text =
+        "voxloom: 1\nnodes:\n  - id: n0\n    type: fake.source\n    set: { size: 16 }\n";
     for (int i = 1; i < kNodes; ++i) {
         std::string id = "n" + std::to_string(i);
         text += "  - id: " + id + "\n";
         if (!chain && i % 100 == 0) {
             text += "    type: fake.gather\n    in:\n      volumes:\n";
-            for (int k = i - 99; k < i; ++k) text += "        - n" + std::to_string(k) + ".volume\n";
+            for (int k = i - 99; k < i; ++k)
+                text += "        - n" + std::to_string(k) + ".volume\n";
         } else {
             text += "    type: fake.add\n    in: { volume: n" + std::to_string(chain ? i - 1 : 0) +
                     ".volume }\n    set: { amount: 0.5 }  # a little\n";
         }
-        text += "    at: [" + std::to_string(i % 100 * 40) + ", " + std::to_string(i / 100 * 40) + "]\n";
+        text += "    at: [" + std::to_string(i % 100 * 40) + ", " + std::to_string(i / 100 * 40) +
+                "]\n";
     }
     return text;
 }

@@ -24,11 +24,12 @@ const Registry& registry() {
         type.id = "fake.add";
         type.title = "Add";
         type.doc = "Adds.";
-        type.inputs = {{"volume", PortType::volume, "In.", true}, {"more", PortType::volume, "In.", true, true}};
+        type.inputs = {{"volume", PortType::volume, "In.", true},
+                       {"more", PortType::volume, "In.", true, true}};
         type.outputs = {{"volume", PortType::volume, "Out."}};
-        type.params = {param::real("amount", 1, "."), param::list("numbers", {}, "."),
+        type.params = {param::real("amount", 1, "."),   param::list("numbers", {}, "."),
                        param::rows("rows", 2, {}, "."), param::texts("texts", {}, "."),
-                       param::path_in("path", "."), param::boolean("flag", false, ".")};
+                       param::path_in("path", "."),     param::boolean("flag", false, ".")};
         type.evaluate = [](Evaluation&) {};
         r.add(type);
         return r;
@@ -68,7 +69,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         return 0;
     }
     Plan plan = check(document.graph(), registry());
-    for (const Problem& problem : plan.problems) require(!problem.text("g.yaml").empty(), "no sentence", text);
+    for (const Problem& problem : plan.problems)
+        require(!problem.text("g.yaml").empty(), "no sentence", text);
 
     try_edit(document, [&] { document.add_node("fuzzed", "fake.add", glm::dvec2(1, 2)); });
     std::vector<std::string> ids;
@@ -77,14 +79,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const std::string& id : ids) {
         const GraphNode node = *document.graph().find(id);
         if (!node.params.empty()) {
-            try_edit(document, [&] { document.set_param(id, node.params[0].key, std::string("a: #b")); });
+            try_edit(document,
+                     [&] { document.set_param(id, node.params[0].key, std::string("a: #b")); });
             try_edit(document, [&] { document.reset_param(id, node.params.back().key); });
         }
-        if (!node.inputs.empty()) try_edit(document, [&] { document.disconnect(id, node.inputs[0].port); });
+        if (!node.inputs.empty())
+            try_edit(document, [&] { document.disconnect(id, node.inputs[0].port); });
         try_edit(document, [&] { document.set_param(id, "rows", Rows{{0, 1}, {2.5, 3}}); });
         try_edit(document, [&] { document.connect(ids[0], "volume", id, "volume", true); });
         try_edit(document, [&] { document.move_node(id, {3, 4}); });
-        try_edit(document, [&] { document.rename_node(id, "renamed-" + std::to_string(size % 10)); });
+        try_edit(document,
+                 [&] { document.rename_node(id, "renamed-" + std::to_string(size % 10)); });
     }
     try_edit(document, [&] { document.set_outputs({{document.graph().nodes[0].id, "volume"}}); });
     try_edit(document, [&] { document.remove_node(document.graph().nodes[0].id); });

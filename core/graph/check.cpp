@@ -1,6 +1,6 @@
-// The check pass, in five steps over one plan: what each node says of itself (type, parameters), the
-// wires, the order (and cycles), the descriptions along that order, and what is asked for. Nothing
-// stops at the first problem; a node with a problem only silences what depends on it.
+// The check pass, in five steps over one plan: what each node says of itself (type, parameters),
+// the wires, the order (and cycles), the descriptions along that order, and what is asked for.
+// Nothing stops at the first problem; a node with a problem only silences what depends on it.
 #include "core/graph/check.h"
 
 #include <fmt/format.h>
@@ -70,7 +70,8 @@ class LimitedSuggestions {
 // What a describe function sees of its node.
 class NodeDescription final : public Description {
   public:
-    NodeDescription(Plan& plan, Plan::Node& node, std::vector<Problem>& problems, const GraphNode& source)
+    NodeDescription(Plan& plan, Plan::Node& node, std::vector<Problem>& problems,
+                    const GraphNode& source)
         : node_(node), problems_(problems), source_(source), inputs_(node.inputs.size()) {
         for (std::size_t i = 0; i < inputs_.size(); ++i)
             for (const Plan::Source& from : node.inputs[i])
@@ -89,8 +90,8 @@ class NodeDescription final : public Description {
     void output(std::string_view port, ValueDesc desc) override {
         std::size_t i = index_of(node_.type->outputs, port);
         if (!node_.type->outputs[i].types.has(desc.type))
-            fail("the node type describes its output '{}' as {}, but declares {}; mend the plugin", port,
-                 name_of(desc.type), node_.type->outputs[i].types.text());
+            fail("the node type describes its output '{}' as {}, but declares {}; mend the plugin",
+                 port, name_of(desc.type), node_.type->outputs[i].types.text());
         node_.outputs[i] = std::move(desc);
     }
     void problem(std::string message, std::string_view where) override {
@@ -122,7 +123,10 @@ class NodeDescription final : public Description {
 class Checker {
   public:
     Checker(const Graph& graph, const Registry& registry, const CheckOptions& options)
-        : graph_(graph), registry_(registry), options_(options), near_type_(registry.ids()),
+        : graph_(graph),
+          registry_(registry),
+          options_(options),
+          near_type_(registry.ids()),
           near_node_(ids_of(graph)) {}
 
     Plan run() {
@@ -181,10 +185,12 @@ class Checker {
             index_.emplace(text.id, i);
             n.type = registry_.find(text.type);
             if (!n.type) {
-                node_problem(i, text.type_mark, {},
-                             fmt::format("unknown node type '{}'{}{}", text.type, near_type_(text.type),
-                                         near_type_(text.type).empty()
-                                             ? "; 'voxloom nodes' lists what there is" : ""));
+                node_problem(
+                    i, text.type_mark, {},
+                    fmt::format("unknown node type '{}'{}{}", text.type, near_type_(text.type),
+                                near_type_(text.type).empty()
+                                    ? "; 'voxloom nodes' lists what there is"
+                                    : ""));
                 continue;
             }
             n.params = Params(n.type->params, plan_.folder);
@@ -213,11 +219,11 @@ class Checker {
         if (auto value = parse_param(*spec, param.yaml, reason))
             node(i).params.set(spec->key, std::move(*value));
         else
-            node_problem(i, param.yaml.mark, param.key,
-                         about_parameter(param.key, reason));
+            node_problem(i, param.yaml.mark, param.key, about_parameter(param.key, reason));
     }
 
-    // --- overrides of the command line ---------------------------------------------------------------
+    // --- overrides of the command line
+    // ---------------------------------------------------------------
 
     void apply_overrides() {
         for (const std::string& text : options_.overrides) apply_override(text);
@@ -241,8 +247,9 @@ class Checker {
         const NodeType& type = *node(i).type;
         const ParamSpec* spec = type.find_param(key);
         if (!spec)
-            return refuse(i, key, fmt::format("node '{}' ({}) has no parameter '{}'{}", id, type.id, key,
-                                              suggestion(key, keys_of(type.params))));
+            return refuse(i, key,
+                          fmt::format("node '{}' ({}) has no parameter '{}'{}", id, type.id, key,
+                                      suggestion(key, keys_of(type.params))));
         std::string reason;
         auto value = parse_override(*spec, text.substr(equals + 1), reason);
         if (!value) return refuse(i, key, about_parameter(key, reason));
@@ -264,7 +271,9 @@ class Checker {
             case ParamKind::choice:
             case ParamKind::text:
             case ParamKind::path_in:
-            case ParamKind::path_out: yaml.text = text; break;
+            case ParamKind::path_out:
+                yaml.text = text;
+                break;
             case ParamKind::vector:
             case ParamKind::color:
             case ParamKind::list:
@@ -278,7 +287,8 @@ class Checker {
         return parse_param(spec, yaml, reason);
     }
 
-    // --- 2: wires ------------------------------------------------------------------------------------
+    // --- 2: wires
+    // ------------------------------------------------------------------------------------
 
     void read_wires() {
         for (int i = 0; i < count(); ++i) {
@@ -306,22 +316,25 @@ class Checker {
                          fmt::format("{} has no input '{}'{}", type->id, input.port,
                                      suggestion(input.port, keys_of(type->inputs))));
         if (port && input.is_list && !port->many && input.from.size() != 1)
-            node_problem(i, input.mark, input.port,
-                         fmt::format("input '{}' takes one wire, not {}", input.port, input.from.size()));
+            node_problem(
+                i, input.mark, input.port,
+                fmt::format("input '{}' takes one wire, not {}", input.port, input.from.size()));
         if (port && port->many && !port->optional && input.from.empty())
             node_problem(i, input.mark, input.port,
                          fmt::format("input '{}' has no wire; it needs at least one {}", input.port,
                                      port->types.text()));
         for (const WireEnd& end : input.from) {
             std::optional<Plan::Source> source = find_source(i, end, input.port);
-            if (!source || source->output < 0 || !port || !accepts(i, *port, *source, end)) continue;
+            if (!source || source->output < 0 || !port || !accepts(i, *port, *source, end))
+                continue;
             node(i).inputs[std::size_t(port - type->inputs.data())].push_back(*source);
         }
     }
 
     // Which output a wire or the graph's outputs name; consumer is -1 for the latter. The output is
     // -1 for a node without a port, nothing is returned where the end is wrong or not known.
-    std::optional<Plan::Source> find_source(int consumer, const WireEnd& end, std::string_view where) {
+    std::optional<Plan::Source> find_source(int consumer, const WireEnd& end,
+                                            std::string_view where) {
         auto report = [&](std::string message) {
             if (consumer >= 0)
                 node_problem(consumer, end.mark, where, std::move(message));
@@ -336,7 +349,8 @@ class Checker {
         int i = found->second;
         if (consumer >= 0) {
             sources_.resize(graph_.nodes.size());
-            sources_[std::size_t(consumer)].push_back(i);  // even where the port is wrong: for the order
+            sources_[std::size_t(consumer)].push_back(
+                i);  // even where the port is wrong: for the order
         }
         const NodeType* type = node(i).type;
         if (!type) return {};
@@ -372,12 +386,12 @@ class Checker {
             if (port.types.has(type_of(o))) fitting.push_back(end.node + "." + o.key);
         for (const PortSpec& p : node(i).type->inputs)
             if (p.types.has(type)) others.push_back("'" + p.key + "'");
-        std::string mend = !fitting.empty() ? "; " + join(fitting, " or ") + " would fit"
+        std::string mend = !fitting.empty()  ? "; " + join(fitting, " or ") + " would fit"
                            : !others.empty() ? "; it fits input " + join(others, " or ")
                                              : example_for(i, port.types);
         node_problem(i, end.mark, port.key,
-                     fmt::format("input '{}' takes {}, but {}.{} is {}{}", port.key, port.types.text(),
-                                 end.node, end.port, name_of(type), mend));
+                     fmt::format("input '{}' takes {}, but {}.{} is {}{}", port.key,
+                                 port.types.text(), end.node, end.port, name_of(type), mend));
         return false;
     }
 
@@ -399,11 +413,13 @@ class Checker {
         }
         for (int t = 0; t < kPortTypes; ++t)
             if (types.has(PortType(t)) && !examples_[std::size_t(t)].empty())
-                return fmt::format("; add for example a node of type {}", examples_[std::size_t(t)].front());
+                return fmt::format("; add for example a node of type {}",
+                                   examples_[std::size_t(t)].front());
         return {};
     }
 
-    // --- 3: order ------------------------------------------------------------------------------------
+    // --- 3: order
+    // ------------------------------------------------------------------------------------
 
     // Tarjan's strongly connected components, without recursion. Components come out sources first,
     // which is the order of evaluation; one of several nodes, or of a node that feeds itself, is a
@@ -450,7 +466,8 @@ class Checker {
                     component.pop_back();
                     open[std::size_t(members.back())] = false;
                 } while (members.back() != n);
-                bool feeds_itself = std::find(sources_[at].begin(), sources_[at].end(), n) != sources_[at].end();
+                bool feeds_itself =
+                    std::find(sources_[at].begin(), sources_[at].end(), n) != sources_[at].end();
                 if (members.size() > 1 || feeds_itself) report_cycle(members);
                 order.insert(order.end(), members.rbegin(), members.rend());
             }
@@ -492,8 +509,9 @@ class Checker {
             cycle.erase(cycle.begin() + most / 2, cycle.end() - most / 2);
             cycle.insert(cycle.begin() + most / 2, left_out);
         }
-        problem(node(first).mark, node(first).id, {},
-                fmt::format("the wires run in a cycle: {}; remove one of them", join(cycle, " -> ")));
+        problem(
+            node(first).mark, node(first).id, {},
+            fmt::format("the wires run in a cycle: {}; remove one of them", join(cycle, " -> ")));
     }
 
     // From the text's order to the order of evaluation.
@@ -520,7 +538,8 @@ class Checker {
         order_ = order;
     }
 
-    // --- 4: descriptions -------------------------------------------------------------------------------
+    // --- 4: descriptions
+    // -------------------------------------------------------------------------------
 
     void describe_nodes() {
         for (int i = 0; i < count(); ++i) {
@@ -534,14 +553,15 @@ class Checker {
             } catch (const Error& e) {
                 description.problem(e.what(), {});
             } catch (const std::exception& e) {
-                description.problem(fmt::format("{} cannot describe its result: {}", n.type->id, e.what()),
-                                    {});
+                description.problem(
+                    fmt::format("{} cannot describe its result: {}", n.type->id, e.what()), {});
             }
             n.ok = !description.failed;
         }
     }
 
-    // --- 5: what is asked for --------------------------------------------------------------------------
+    // --- 5: what is asked for
+    // --------------------------------------------------------------------------
 
     void find_wanted() {
         for (const WireEnd& end : graph_.outputs)
@@ -581,9 +601,10 @@ class Checker {
         if (limit == 0) limit = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGESIZE));
         if (total > limit)
             plan_.warnings.push_back(fmt::format(
-                "this graph may need {} of memory at once, {} of it for node '{}', and there are {}; "
-                "take a smaller region or coarser level, or ask for fewer outputs", human_bytes(total),
-                human_bytes(largest), largest_name, human_bytes(limit)));
+                "this graph may need {} of memory at once, {} of it for node '{}', and there are "
+                "{}; "
+                "take a smaller region or coarser level, or ask for fewer outputs",
+                human_bytes(total), human_bytes(largest), largest_name, human_bytes(limit)));
     }
 
     static double memory_of(const Plan::Node& node) {
@@ -597,7 +618,8 @@ class Checker {
     static double memory_of(const ValueDesc& desc) {
         if (auto* image = std::get_if<ImageDesc>(&desc.detail))
             return double(image->size.x) * double(image->size.y) * 16;
-        if (auto* bricks = std::get_if<BricksDesc>(&desc.detail)) return double(bricks->compressed_bytes);
+        if (auto* bricks = std::get_if<BricksDesc>(&desc.detail))
+            return double(bricks->compressed_bytes);
         if (auto* lattice = std::get_if<std::shared_ptr<const LatticeDesc>>(&desc.detail)) {
             double bytes = 0;
             for (const LatticeDesc::Grid& grid : (*lattice)->grids) bytes += memory_of(grid.grid);
@@ -617,8 +639,9 @@ class Checker {
     LimitedSuggestions near_type_, near_node_;
     Plan plan_;
     std::unordered_map<std::string_view, int> index_;
-    std::vector<std::vector<int>> sources_;  // nodes that feed each node, of every wire that names one
-    std::vector<int> order_;                 // of evaluation, as indices into graph_.nodes
+    std::vector<std::vector<int>>
+        sources_;             // nodes that feed each node, of every wire that names one
+    std::vector<int> order_;  // of evaluation, as indices into graph_.nodes
     std::vector<std::vector<std::string>> examples_;  // node types by the PortType they make
 };
 

@@ -17,7 +17,8 @@ namespace fs = std::filesystem;
 
 std::string Problem::text(const fs::path& file) const {
     if (mark.line == 0) return message;  // not from the text, but from the command line
-    std::string place = fmt::format("{}:{}:{}", file.empty() ? "graph" : file.string(), mark.line, mark.column);
+    std::string place =
+        fmt::format("{}:{}:{}", file.empty() ? "graph" : file.string(), mark.line, mark.column);
     return node.empty() ? fmt::format("{}: {}", place, message)
                         : fmt::format("{}: node '{}': {}", place, node, message);
 }
@@ -32,7 +33,8 @@ fs::path Graph::folder() const {
     return file.empty() ? fs::current_path() : fs::absolute(file).lexically_normal().parent_path();
 }
 
-// --- reading and writing ----------------------------------------------------------------------------
+// --- reading and writing
+// ----------------------------------------------------------------------------
 
 Document::Document() : Document(parse("voxloom: 1\nnodes: []\n")) {}
 
@@ -70,11 +72,13 @@ Document Document::load(const fs::path& file) {
     if (!stream)
         fail("{}: the graph cannot be opened ({}); check the path", file.string(),
              std::generic_category().message(errno));
-    // One byte more than is allowed shows that there is too much, whatever the file claims to be.
-    std::string text(kMaximumGraphBytes + 1, '\0');
-    stream.read(text.data(), std::streamsize(text.size()));
+    // In pieces and no further than is allowed, whatever size the file claims to have.
+    std::string text;
+    for (char piece[1 << 16]; stream && text.size() <= kMaximumGraphBytes;) {
+        stream.read(piece, sizeof piece);
+        text.append(piece, std::size_t(stream.gcount()));
+    }
     if (stream.bad()) fail("{}: the graph cannot be read", file.string());
-    text.resize(std::size_t(stream.gcount()));
     return parse(std::move(text), file);
 }
 
@@ -90,8 +94,9 @@ void Document::save(const fs::path& file) {
     stream.close();
     if (!stream) {
         fs::remove(temporary, error);
-        fail("{}: the graph cannot be written here; check the folder, its rights and the free space",
-             file.string());
+        fail(
+            "{}: the graph cannot be written here; check the folder, its rights and the free space",
+            file.string());
     }
     fs::rename(temporary, target, error);
     if (error) {
@@ -102,7 +107,8 @@ void Document::save(const fs::path& file) {
     graph_.file = file;
 }
 
-// --- edits -------------------------------------------------------------------------------------------
+// --- edits
+// -------------------------------------------------------------------------------------------
 //
 // Each edit changes a copy of the graph. The text is then patched where the two differ and read
 // again; only when it says what the copy says does it become the document.
@@ -182,7 +188,8 @@ void Document::apply(const Graph& wanted) {
     fail("the change cannot be written into this text; write the node as 'key: value' lines first");
 }
 
-void Document::add_node(const std::string& id, const std::string& type, std::optional<glm::dvec2> at) {
+void Document::add_node(const std::string& id, const std::string& type,
+                        std::optional<glm::dvec2> at) {
     require_name(id, "id for a node");
     require_text(type, "the node type");
     if (type.empty()) fail("node '{}' needs a type", id);
@@ -238,7 +245,8 @@ void Document::set_param(const std::string& id, const std::string& key, const Pa
 
 void Document::reset_param(const std::string& id, const std::string& key) {
     Graph wanted = graph_;
-    std::erase_if(node_of(wanted, id).params, [&](const GraphParam& param) { return param.key == key; });
+    std::erase_if(node_of(wanted, id).params,
+                  [&](const GraphParam& param) { return param.key == key; });
     apply(wanted);
 }
 
@@ -283,7 +291,8 @@ void Document::set_outputs(const std::vector<std::pair<std::string, std::string>
     apply(wanted);
 }
 
-// --- history -----------------------------------------------------------------------------------------
+// --- history
+// -----------------------------------------------------------------------------------------
 
 void Document::undo() {
     if (!can_undo()) return;
@@ -319,7 +328,9 @@ void Document::redo() {
     read();
 }
 
-Document::Step::Step(Document& document) : document_(document) { ++document_.step_depth_; }
+Document::Step::Step(Document& document) : document_(document) {
+    ++document_.step_depth_;
+}
 
 Document::Step::~Step() {
     if (--document_.step_depth_ == 0) document_.step_open_ = false;

@@ -102,11 +102,12 @@ class Document {
     void set_param(const std::string& id, const std::string& key, const ParamValue& value);
     void reset_param(const std::string& id, const std::string& key);
     // Replaces what was wired to the port; `append` adds a wire to a port that takes many.
-    void connect(const std::string& from_node, const std::string& from_port, const std::string& to_node,
-                 const std::string& to_port, bool append = false);
+    void connect(const std::string& from_node, const std::string& from_port,
+                 const std::string& to_node, const std::string& to_port, bool append = false);
     void disconnect(const std::string& to_node, const std::string& to_port);
     void move_node(const std::string& id, glm::dvec2 at);
-    void set_outputs(const std::vector<std::pair<std::string, std::string>>& outputs);  // empty: remove the key
+    // Of node and port (empty: the node itself); an empty list removes the key.
+    void set_outputs(const std::vector<std::pair<std::string, std::string>>& outputs);
 
     bool can_undo() const { return done_ > 0; }
     bool can_redo() const { return done_ < history_.size(); }

@@ -18,7 +18,9 @@ using Kind = YamlNode::Kind;
 
 constexpr std::size_t kColumns = 100;  // flow lists and maps are broken beyond
 
-std::string scalar(const std::string& s) { return to_yaml(ParamValue(s)); }
+std::string scalar(const std::string& s) {
+    return to_yaml(ParamValue(s));
+}
 
 Yaml yaml_of(const std::vector<WireEnd>& ends, bool is_list) {
     auto plain = [](const WireEnd& end) {
@@ -33,7 +35,9 @@ Yaml yaml_of(const std::vector<WireEnd>& ends, bool is_list) {
     return list;
 }
 
-std::string to_text(glm::dvec2 at) { return fmt::format("[{}, {}]", shortest(at.x), shortest(at.y)); }
+std::string to_text(glm::dvec2 at) {
+    return fmt::format("[{}, {}]", shortest(at.x), shortest(at.y));
+}
 
 // Quoted only where it would not read back: the keys of a graph are names such as x, y and n.
 std::string key_text(const std::string& key) {
@@ -48,7 +52,8 @@ struct Entry {
 
 std::vector<Entry> entries_of(const std::vector<GraphInput>& inputs) {
     std::vector<Entry> entries;
-    for (const GraphInput& input : inputs) entries.push_back({input.port, yaml_of(input.from, input.is_list)});
+    for (const GraphInput& input : inputs)
+        entries.push_back({input.port, yaml_of(input.from, input.is_list)});
     return entries;
 }
 
@@ -64,7 +69,9 @@ const Entry* find(const std::vector<Entry>& entries, std::string_view key) {
     return nullptr;
 }
 
-std::string to_text(const Entry& entry) { return key_text(entry.key) + ": " + voxloom::to_text(entry.value); }
+std::string to_text(const Entry& entry) {
+    return key_text(entry.key) + ": " + voxloom::to_text(entry.value);
+}
 
 std::string to_text(const std::vector<Entry>& entries) {
     std::vector<std::string> parts;
@@ -82,9 +89,9 @@ std::vector<std::string> lines_of(const GraphNode& node) {
 }
 
 bool same_wires(const std::vector<WireEnd>& a, const std::vector<WireEnd>& b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const WireEnd& x, const WireEnd& y) {
-        return x.node == y.node && x.port == y.port;
-    });
+    return std::equal(
+        a.begin(), a.end(), b.begin(), b.end(),
+        [](const WireEnd& x, const WireEnd& y) { return x.node == y.node && x.port == y.port; });
 }
 
 // Quotes matter only where the text could be taken for something else.
@@ -108,7 +115,8 @@ bool same(const GraphNode& a, const GraphNode& b) {
     return a.id == b.id && a.type == b.type && a.at == b.at &&
            std::equal(a.inputs.begin(), a.inputs.end(), b.inputs.begin(), b.inputs.end(),
                       [](const GraphInput& x, const GraphInput& y) {
-                          return x.port == y.port && x.is_list == y.is_list && same_wires(x.from, y.from);
+                          return x.port == y.port && x.is_list == y.is_list &&
+                                 same_wires(x.from, y.from);
                       }) &&
            std::equal(a.params.begin(), a.params.end(), b.params.begin(), b.params.end(),
                       [](const GraphParam& x, const GraphParam& y) {
@@ -119,15 +127,17 @@ bool same(const GraphNode& a, const GraphNode& b) {
 class Patcher {
   public:
     Patcher(const std::string& text, const YamlNode& root, bool surgical)
-        : text_(text), root_(root), surgical_(surgical),
+        : text_(text),
+          root_(root),
+          surgical_(surgical),
           newline_(text.find("\r\n") == std::string::npos ? "\n" : "\r\n") {}
 
     std::vector<TextPatch> run(const Graph& from, const Graph& to) {
         patch_outputs(from.outputs, to.outputs);
         patch_nodes(from.nodes, to.nodes);
-        std::stable_sort(patches_.begin(), patches_.end(), [](const TextPatch& a, const TextPatch& b) {
-            return a.position < b.position;
-        });
+        std::stable_sort(
+            patches_.begin(), patches_.end(),
+            [](const TextPatch& a, const TextPatch& b) { return a.position < b.position; });
         return std::move(patches_);
     }
 
@@ -136,7 +146,8 @@ class Patcher {
         std::size_t begin, end;
     };
 
-    // --- what changed ------------------------------------------------------------------------------
+    // --- what changed
+    // ------------------------------------------------------------------------------
 
     void patch_outputs(const std::vector<WireEnd>& from, const std::vector<WireEnd>& to) {
         if (same_wires(from, to)) return;
@@ -186,8 +197,8 @@ class Patcher {
                 replace_value(root_, list, item);
         } else {
             std::size_t margin = column(root_.begin);
-            std::string item = newline_ + indent(margin + 2) + "- " +
-                               join(lines, newline_ + indent(margin + 4));
+            std::string item =
+                newline_ + indent(margin + 2) + "- " + join(lines, newline_ + indent(margin + 4));
             if (list < 0) {
                 insert_entry(root_, int(root_.keys.size()) - 1, "nodes:" + item);
             } else {
@@ -229,7 +240,8 @@ class Patcher {
         int at = node.index_of(name);
         if (to.empty()) return remove_entries(node, {at});
         if (at < 0)
-            return insert_entry(node, predecessor(node, name), std::string(name) + ": " + to_text(to));
+            return insert_entry(node, predecessor(node, name),
+                                std::string(name) + ": " + to_text(to));
         const YamlNode& map = node.items[std::size_t(at)];
         if (map.items.empty()) return replace_value(node, at, to_text(to));
         std::vector<int> removed;
@@ -295,7 +307,8 @@ class Patcher {
         return true;
     }
 
-    // --- collections ---------------------------------------------------------------------------------
+    // --- collections
+    // ---------------------------------------------------------------------------------
 
     void insert_entry(const YamlNode& map, int after, const std::string& entry) {
         assert(after >= 0);
@@ -318,7 +331,8 @@ class Patcher {
         bool fits = line_end(end) - line_start(end) + entry.size() + 2 <= kColumns;
         if (fits) return patch(end, 0, ", " + entry);
         // Below the first entry, unless that stands far out.
-        const YamlNode& first = collection.kind == Kind::map ? collection.keys[0] : collection.items[0];
+        const YamlNode& first =
+            collection.kind == Kind::map ? collection.keys[0] : collection.items[0];
         std::size_t margin = column(first.begin);
         if (margin > kColumns / 2) margin = skip_spaces(line_start(end)) - line_start(end) + 4;
         patch(end, 0, "," + newline_ + indent(margin) + entry);
@@ -370,8 +384,10 @@ class Patcher {
         if (line_end(kept_end) >= begin) {
             begin = kept_end;
         } else {
-            if (std::size_t comma = skip_blank(text_, end); text_[comma] == ',') patch(comma, 1, "");
-            if (begins_line(begin) && skip_spaces(end) == line_end(end)) begin = end_of_line_before(begin);
+            if (std::size_t comma = skip_blank(text_, end); text_[comma] == ',')
+                patch(comma, 1, "");
+            if (begins_line(begin) && skip_spaces(end) == line_end(end))
+                begin = end_of_line_before(begin);
         }
         patch(begin, end - begin, "");
     }
@@ -379,8 +395,7 @@ class Patcher {
     void remove_lines(Span span) {
         std::size_t begin = line_start(span.begin), end = next_line(span.end);
         // The text's last line takes the line break before it along, so that none is added.
-        if (end == text_.size() && text_.back() != '\n')
-            begin = end_of_line_before(begin);
+        if (end == text_.size() && text_.back() != '\n') begin = end_of_line_before(begin);
         patch(begin, end - begin, "");
     }
 
@@ -400,7 +415,8 @@ class Patcher {
         }
     }
 
-    // --- the text ------------------------------------------------------------------------------------
+    // --- the text
+    // ------------------------------------------------------------------------------------
 
     void patch(std::size_t position, std::size_t length, std::string inserted) {
         patches_.push_back({position, length, std::move(inserted)});
@@ -487,8 +503,8 @@ bool same_content(const Graph& a, const Graph& b) {
                       [](const GraphNode& x, const GraphNode& y) { return same(x, y); });
 }
 
-std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root, const Graph& from,
-                                       const Graph& to, bool surgical) {
+std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root,
+                                       const Graph& from, const Graph& to, bool surgical) {
     return Patcher(text, root, surgical).run(from, to);
 }
 

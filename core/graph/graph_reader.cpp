@@ -17,11 +17,15 @@ using Kind = YamlNode::Kind;
 
 std::string_view kind_name(const YamlNode& node) {
     switch (node.kind) {
-        case Kind::null: return "nothing";
+        case Kind::null:
+            return "nothing";
         case Kind::plain:
-        case Kind::quoted: return "a single value";
-        case Kind::sequence: return "a list";
-        case Kind::map: return "a map";
+        case Kind::quoted:
+            return "a single value";
+        case Kind::sequence:
+            return "a list";
+        case Kind::map:
+            return "a map";
     }
     return "";
 }
@@ -32,10 +36,11 @@ class GraphReader {
 
     Graph read(const YamlNode& root) {
         if (root.kind != Kind::map) {
-            problem(root, root.kind == Kind::null
-                              ? "the text is empty; a graph begins with 'voxloom: 1'"
-                              : fmt::format("a graph is a map that begins with 'voxloom: 1', this is {}",
-                                            kind_name(root)));
+            problem(root,
+                    root.kind == Kind::null
+                        ? "the text is empty; a graph begins with 'voxloom: 1'"
+                        : fmt::format("a graph is a map that begins with 'voxloom: 1', this is {}",
+                                      kind_name(root)));
             return {};
         }
         // A file of another version may differ in everything else, so only that is said.
@@ -50,16 +55,27 @@ class GraphReader {
         yaml.mark = value.mark;
         switch (value.kind) {
             case Kind::null:
-                problem(value, fmt::format("parameter '{}' has no value; give it one or remove the key (a "
-                                           "text '~' or 'null' needs quotes)", key), key);
+                problem(value,
+                        fmt::format("parameter '{}' has no value; give it one or remove the key (a "
+                                    "text '~' or 'null' needs quotes)",
+                                    key),
+                        key);
                 return false;
             case Kind::map:
-                problem(value, fmt::format("parameter '{}' is a map; a parameter is a value or a list",
-                                           key), key);
+                problem(
+                    value,
+                    fmt::format("parameter '{}' is a map; a parameter is a value or a list", key),
+                    key);
                 return false;
-            case Kind::plain: yaml.kind = GraphParam::Yaml::Kind::plain; break;
-            case Kind::quoted: yaml.kind = GraphParam::Yaml::Kind::quoted; break;
-            case Kind::sequence: yaml.kind = GraphParam::Yaml::Kind::list; break;
+            case Kind::plain:
+                yaml.kind = GraphParam::Yaml::Kind::plain;
+                break;
+            case Kind::quoted:
+                yaml.kind = GraphParam::Yaml::Kind::quoted;
+                break;
+            case Kind::sequence:
+                yaml.kind = GraphParam::Yaml::Kind::list;
+                break;
         }
         yaml.text = value.text;
         bool fine = true;
@@ -74,7 +90,8 @@ class GraphReader {
         problems_.push_back({at.mark, id_, std::move(where), std::move(message)});
     }
 
-    void check_keys(const YamlNode& map, const std::vector<std::string>& known, std::string_view what) {
+    void check_keys(const YamlNode& map, const std::vector<std::string>& known,
+                    std::string_view what) {
         for (const YamlNode& key : map.keys)
             if (std::find(known.begin(), known.end(), key.text) == known.end())
                 problem(key, fmt::format("unknown key '{}'{}; {} has: {}", key.text,
@@ -87,15 +104,18 @@ class GraphReader {
             // Perhaps misspelt; then that is the better message.
             std::size_t before = problems_.size();
             check_keys(root, {"voxloom", "outputs", "nodes"}, "a graph");
-            problem(root, "there is no 'voxloom: 1', which says that this is a graph and of which version");
+            problem(
+                root,
+                "there is no 'voxloom: 1', which says that this is a graph and of which version");
             return before + 1 < problems_.size();  // go on where only this key is wrong
         }
         if (version->kind == Kind::plain && version->text == "1") return true;
-        problem(*version, version->is_scalar()
-                              ? fmt::format("'voxloom: {}' is a version that this program does not "
-                                            "know, it reads 1; use a newer program, or write 'voxloom: 1'",
-                                            version->text)
-                              : fmt::format("'voxloom' is {}; write 'voxloom: 1'", kind_name(*version)));
+        problem(*version,
+                version->is_scalar()
+                    ? fmt::format("'voxloom: {}' is a version that this program does not "
+                                  "know, it reads 1; use a newer program, or write 'voxloom: 1'",
+                                  version->text)
+                    : fmt::format("'voxloom' is {}; write 'voxloom: 1'", kind_name(*version)));
         return false;
     }
 
@@ -112,8 +132,9 @@ class GraphReader {
     void read_nodes(const YamlNode& list) {
         if (list.kind == Kind::null) return;
         if (list.kind != Kind::sequence) {
-            problem(list, fmt::format("'nodes' is {}; it must be a list, each item begins with '- id:'",
-                                      kind_name(list)));
+            problem(list,
+                    fmt::format("'nodes' is {}; it must be a list, each item begins with '- id:'",
+                                kind_name(list)));
             return;
         }
         graph_.nodes.reserve(list.items.size());
@@ -127,14 +148,17 @@ class GraphReader {
             if (!id || id->text.empty()) continue;
             auto [first, fresh] = line_of.emplace(id->text, id->mark.line);
             if (!fresh)
-                problem(*id, fmt::format("there are two nodes '{}', here and in line {}; give each an id "
-                                         "of its own", id->text, first->second));
+                problem(*id, fmt::format(
+                                 "there are two nodes '{}', here and in line {}; give each an id "
+                                 "of its own",
+                                 id->text, first->second));
         }
     }
 
     void read_node(const YamlNode& map) {
         if (map.kind != Kind::map) {
-            problem(map, fmt::format("a node must be a map with 'id' and 'type', this is {}", kind_name(map)));
+            problem(map, fmt::format("a node must be a map with 'id' and 'type', this is {}",
+                                     kind_name(map)));
             return;
         }
         GraphNode node;
@@ -144,18 +168,21 @@ class GraphReader {
             if (id->is_scalar() && is_node_name(id->text))
                 id_ = node.id = id->text;
             else
-                problem(*id, fmt::format("the id {} is not a name of at most 100 lower-case letters, "
-                                         "digits, '_' and '-'",
-                                         id->is_scalar() ? "'" + id->text + "'" : "is missing or"));
+                problem(*id,
+                        fmt::format("the id {} is not a name of at most 100 lower-case letters, "
+                                    "digits, '_' and '-'",
+                                    id->is_scalar() ? "'" + id->text + "'" : "is missing or"));
         } else {
             problem(map, "this node has no 'id'; give it a name");
         }
         check_keys(map, {"id", "type", "in", "set", "at"}, "a node");
-        if (const YamlNode* type = map.find("type"); type && type->is_scalar() && !type->text.empty()) {
+        if (const YamlNode* type = map.find("type");
+            type && type->is_scalar() && !type->text.empty()) {
             node.type = type->text;
             node.type_mark = type->mark;
         } else {
-            problem(type ? *type : map, "this node has no 'type'; 'voxloom nodes' lists what there is");
+            problem(type ? *type : map,
+                    "this node has no 'type'; 'voxloom nodes' lists what there is");
         }
         if (const YamlNode* in = map.find("in")) read_inputs(*in, node);
         if (const YamlNode* set = map.find("set")) read_params(*set, node);
@@ -166,8 +193,9 @@ class GraphReader {
     void read_inputs(const YamlNode& map, GraphNode& node) {
         if (map.kind == Kind::null) return;
         if (map.kind != Kind::map) {
-            problem(map, fmt::format("'in' is {}; it must be a map, such as {{ source: ct.volume }}",
-                                     kind_name(map)));
+            problem(map,
+                    fmt::format("'in' is {}; it must be a map, such as {{ source: ct.volume }}",
+                                kind_name(map)));
             return;
         }
         for (std::size_t i = 0; i < map.keys.size(); ++i) {
@@ -177,10 +205,12 @@ class GraphReader {
             const YamlNode& value = map.items[i];
             input.is_list = value.kind == Kind::sequence;
             if (!input.is_list) {
-                if (auto end = read_wire_end(value, input.port)) input.from.push_back(std::move(*end));
+                if (auto end = read_wire_end(value, input.port))
+                    input.from.push_back(std::move(*end));
             } else {
                 for (const YamlNode& item : value.items)
-                    if (auto end = read_wire_end(item, input.port)) input.from.push_back(std::move(*end));
+                    if (auto end = read_wire_end(item, input.port))
+                        input.from.push_back(std::move(*end));
             }
             node.inputs.push_back(std::move(input));
         }
@@ -206,15 +236,17 @@ class GraphReader {
     void read_params(const YamlNode& map, GraphNode& node) {
         if (map.kind == Kind::null) return;
         if (map.kind != Kind::map) {
-            problem(map, fmt::format("'set' is {}; it must be a map, such as {{ size: [512, 512] }}",
-                                     kind_name(map)));
+            problem(map,
+                    fmt::format("'set' is {}; it must be a map, such as {{ size: [512, 512] }}",
+                                kind_name(map)));
             return;
         }
         for (std::size_t i = 0; i < map.keys.size(); ++i) {
             GraphParam param;
             param.key = map.keys[i].text;
             param.mark = map.keys[i].mark;
-            if (read_value(map.items[i], param.yaml, param.key)) node.params.push_back(std::move(param));
+            if (read_value(map.items[i], param.yaml, param.key))
+                node.params.push_back(std::move(param));
         }
     }
 
@@ -223,7 +255,8 @@ class GraphReader {
         bool fine = list.kind == Kind::sequence && list.items.size() == 2;
         for (int i = 0; fine && i < 2; ++i) {
             const YamlNode& item = list.items[std::size_t(i)];
-            fine = item.kind == Kind::plain && parse_number(item.text, at[i]) && std::isfinite(at[i]);
+            fine =
+                item.kind == Kind::plain && parse_number(item.text, at[i]) && std::isfinite(at[i]);
         }
         if (fine)
             node.at = at;
@@ -242,9 +275,12 @@ using Yaml = GraphParam::Yaml;
 
 std::string described(const Yaml& yaml) {
     switch (yaml.kind) {
-        case Yaml::Kind::plain: return fmt::format("'{}'", yaml.text);
-        case Yaml::Kind::quoted: return fmt::format("the text \"{}\"", yaml.text);
-        case Yaml::Kind::list: return "a list";
+        case Yaml::Kind::plain:
+            return fmt::format("'{}'", yaml.text);
+        case Yaml::Kind::quoted:
+            return fmt::format("the text \"{}\"", yaml.text);
+        case Yaml::Kind::list:
+            return "a list";
     }
     return "";
 }
@@ -256,7 +292,8 @@ bool parse_numbers(const Yaml& yaml, std::vector<double>& numbers, std::string& 
     }
     numbers.resize(yaml.items.size());
     for (std::size_t i = 0; i < numbers.size(); ++i)
-        if (yaml.items[i].kind != Yaml::Kind::plain || !parse_number(yaml.items[i].text, numbers[i])) {
+        if (yaml.items[i].kind != Yaml::Kind::plain ||
+            !parse_number(yaml.items[i].text, numbers[i])) {
             reason = fmt::format("must be a list of numbers, but item {} is {}", i + 1,
                                  described(yaml.items[i]));
             return false;
@@ -299,8 +336,9 @@ std::optional<ParamValue> convert(const ParamSpec& spec, const Yaml& yaml, std::
         }
         case ParamKind::rows: {
             if (yaml.kind != Yaml::Kind::list) {
-                reason = fmt::format("must be a list of lists of numbers such as [[0, 1], [2, 3]], not {}",
-                                     described(yaml));
+                reason = fmt::format(
+                    "must be a list of lists of numbers such as [[0, 1], [2, 3]], not {}",
+                    described(yaml));
                 return {};
             }
             Rows rows(yaml.items.size());
@@ -332,7 +370,8 @@ std::optional<ParamValue> convert(const ParamSpec& spec, const Yaml& yaml, std::
 
 bool is_node_name(std::string_view name) {
     return !name.empty() && name.size() <= 100 &&
-           name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string_view::npos;
+           name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") ==
+               std::string_view::npos;
 }
 
 Graph read_graph(const YamlNode& root, std::vector<Problem>& problems) {

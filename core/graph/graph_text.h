@@ -33,7 +33,7 @@ struct TextPatch {
 // Which patches turn the text of `from`, parsed to `root`, into one of `to`, in rising order. The
 // graphs may differ in what their nodes and outputs hold, or `to` lacks some nodes, or has more at
 // its end. `surgical` patches touch what changed alone; otherwise whole nodes are written anew.
-std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root, const Graph& from,
-                                       const Graph& to, bool surgical);
+std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root,
+                                       const Graph& from, const Graph& to, bool surgical);
 
 }  // namespace voxloom

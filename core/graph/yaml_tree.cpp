@@ -38,11 +38,16 @@ std::size_t skip_blank(std::string_view text, std::size_t position) {
 }
 
 std::size_t find_invalid_utf8(std::string_view text) {
-    auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+    auto byte = [&](std::size_t i) {
+        return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+    };
     for (std::size_t i = 0; i < text.size();) {
         unsigned lead = byte(i);
-        std::size_t length = lead < 0x80 ? 1 : lead >= 0xc2 && lead < 0xe0 ? 2
-                           : lead >= 0xe0 && lead < 0xf0 ? 3 : lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
+        std::size_t length = lead < 0x80                   ? 1
+                             : lead >= 0xc2 && lead < 0xe0 ? 2
+                             : lead >= 0xe0 && lead < 0xf0 ? 3
+                             : lead >= 0xf0 && lead < 0xf5 ? 4
+                                                           : 0;
         if (length == 0) return i;
         for (std::size_t k = 1; k < length; ++k)
             if ((byte(i + k) & 0xc0) != 0x80) return i;
@@ -108,11 +113,14 @@ class TreeBuilder final : public YAML::EventHandler {
 
     void OnDocumentStart(const YAML::Mark& mark) override {
         if (documents_++ > 0)
-            throw Refused{position_of(mark),
-                          "a second document begins here; a graph is one document, remove the '---'"};
+            throw Refused{
+                position_of(mark),
+                "a second document begins here; a graph is one document, remove the '---'"};
     }
     void OnDocumentEnd() override {}
-    void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { refuse_indicator(position_of(mark)); }
+    void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+        refuse_indicator(position_of(mark));
+    }
 
     void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
         // The mark of a value that is left out is that of whatever comes next.
@@ -124,7 +132,8 @@ class TreeBuilder final : public YAML::EventHandler {
             consumed_ = node.end = at + length;
         } else {
             std::size_t colon = skip_blank(text_, consumed_);
-            if (expects_value() && colon < text_.size() && text_[colon] == ':') consumed_ = colon + 1;
+            if (expects_value() && colon < text_.size() && text_[colon] == ':')
+                consumed_ = colon + 1;
             node = start(consumed_);
             node.end = consumed_;
         }
@@ -139,9 +148,9 @@ class TreeBuilder final : public YAML::EventHandler {
         char first = at < text_.size() ? text_[at] : '\0';
         bool plain = std::string_view("'\"|>").find(first) == std::string_view::npos;
         node.kind = plain ? YamlNode::Kind::plain : YamlNode::Kind::quoted;
-        node.end = consumed_ = plain ? end_of_plain(at, value)
-                             : first == '\'' || first == '"' ? end_of_quoted(at)
-                                                             : end_of_block_text(at, value);
+        node.end = consumed_ = plain                           ? end_of_plain(at, value)
+                               : first == '\'' || first == '"' ? end_of_quoted(at)
+                                                               : end_of_block_text(at, value);
         node.text = value;
         add(std::move(node));
     }
@@ -191,8 +200,8 @@ class TreeBuilder final : public YAML::EventHandler {
         std::size_t at = position_of(mark);
         pass_gap(at);
         if (stack_.size() >= kMaximumGraphDepth)
-            throw Refused{at, fmt::format("lists and maps are nested more than {} deep",
-                                          kMaximumGraphDepth)};
+            throw Refused{
+                at, fmt::format("lists and maps are nested more than {} deep", kMaximumGraphDepth)};
         char bracket = kind == YamlNode::Kind::map ? '{' : '[';
         if (flow && (at >= text_.size() || text_[at] != bracket))
             throw Refused{at, "a 'key: value' pair inside a list must stand in braces"};
@@ -228,13 +237,18 @@ class TreeBuilder final : public YAML::EventHandler {
             const YamlNode& first = map.keys[order[i - 1]];
             const YamlNode& second = map.keys[order[i]];
             if (first.text == second.text)
-                problems_.push_back({second.mark, {}, {},
-                                     fmt::format("key '{}' stands twice, here and in line {}; remove "
-                                                 "one of the two", second.text, first.mark.line)});
+                problems_.push_back(
+                    {second.mark,
+                     {},
+                     {},
+                     fmt::format("key '{}' stands twice, here and in line {}; remove "
+                                 "one of the two",
+                                 second.text, first.mark.line)});
         }
     }
 
-    // --- from events to ends ----------------------------------------------------------------------
+    // --- from events to ends
+    // ----------------------------------------------------------------------
 
     // Between two nodes there are only white space, comments and indicators. Anything else is a
     // form of YAML that patching the text would not survive.
@@ -252,17 +266,22 @@ class TreeBuilder final : public YAML::EventHandler {
         switch (at < text_.size() ? text_[at] : '\0') {
             case '&':
             case '*':
-                throw Refused{at, "anchors and aliases ('&', '*') are not supported in a graph; write "
-                                  "the value out, or put it in quotes if it is a text"};
+                throw Refused{at,
+                              "anchors and aliases ('&', '*') are not supported in a graph; write "
+                              "the value out, or put it in quotes if it is a text"};
             case '!':
-                throw Refused{at, "tags ('!') are not supported in a graph; remove it, or put the "
-                                  "value in quotes if it is a text"};
-            case '%': throw Refused{at, "directives ('%') are not supported in a graph; remove the line"};
+                throw Refused{at,
+                              "tags ('!') are not supported in a graph; remove it, or put the "
+                              "value in quotes if it is a text"};
+            case '%':
+                throw Refused{at, "directives ('%') are not supported in a graph; remove the line"};
             case '?':
-                throw Refused{at, "keys written with '?' are not supported in a graph; write 'key: value'"};
+                throw Refused{
+                    at, "keys written with '?' are not supported in a graph; write 'key: value'"};
             default:
-                throw Refused{at, "this form of YAML is not supported in a graph; write 'key: value' "
-                                  "lines, [lists] and {maps}"};
+                throw Refused{at,
+                              "this form of YAML is not supported in a graph; write 'key: value' "
+                              "lines, [lists] and {maps}"};
         }
     }
 
@@ -305,8 +324,9 @@ class TreeBuilder final : public YAML::EventHandler {
         std::string_view header = text_.substr(begin, line_end - begin);
         header = header.substr(0, header.find('#'));
         if (header.find_first_of("123456789") != std::string_view::npos)
-            throw Refused{begin, "a block text with an indentation number is not supported in a "
-                                 "graph; put the text in double quotes"};
+            throw Refused{begin,
+                          "a block text with an indentation number is not supported in a "
+                          "graph; put the text in double quotes"};
         std::size_t end = line_end;
         if (end > begin && text_[end - 1] == '\r') --end;
         if (value.find_first_not_of('\n') == std::string_view::npos) return end;

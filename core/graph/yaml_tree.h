@@ -3,8 +3,8 @@
 //
 // Parsing is yaml-cpp's, through its events; it reports where things begin. Where they end is found
 // here, from the text between one event and the next. What a graph has no use for and an edit could
-// break is refused with a sentence: anchors, aliases, tags, directives, several documents, '? ' keys,
-// pairs without braces in a flow list, block texts with an indentation number, deep nesting.
+// break is refused with a sentence: anchors, aliases, tags, directives, several documents, '? '
+// keys, pairs without braces in a flow list, block texts with an indentation number, deep nesting.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ namespace voxloom {
 
 struct YamlNode {
     enum class Kind : std::uint8_t { null, plain, quoted, sequence, map } kind = Kind::null;
-    bool flow = false;                 // a collection in [] or {}
-    Mark mark;                         // of `begin`; columns count characters
-    std::size_t begin = 0, end = 0;    // bytes of the text; a value left out is empty, after its ':'
-    std::string text;                  // of scalars, unescaped and unfolded
-    std::vector<YamlNode> items;       // of a sequence; the values of a map
-    std::vector<YamlNode> keys;        // of a map, beside items; scalars, no two alike
+    bool flow = false;               // a collection in [] or {}
+    Mark mark;                       // of `begin`; columns count characters
+    std::size_t begin = 0, end = 0;  // bytes of the text; a value left out is empty, after its ':'
+    std::string text;                // of scalars, unescaped and unfolded
+    std::vector<YamlNode> items;     // of a sequence; the values of a map
+    std::vector<YamlNode> keys;      // of a map, beside items; scalars, no two alike
 
     bool is_scalar() const { return kind == Kind::plain || kind == Kind::quoted; }
     int index_of(std::string_view key) const;  // -1 when there is no such key

@@ -55,7 +55,6 @@ TEST(Check, PutsEverySourceBeforeItsConsumers) {
     EXPECT_TRUE(plan.nodes[0].ok && plan.nodes[1].ok);
 }
 
-
 TEST(Check, FindsEveryProblemInOrderOfLine) {
     Plan plan = check_text(R"(voxloom: 1
 outputs: [nobody.volume, sum.volum, table, all.image]
@@ -83,23 +82,29 @@ nodes:
     type: fake.add
     in: { volume: writer.volume }
 )");
-    EXPECT_EQ(problems_of(plan),
+    EXPECT_EQ(
+        problems_of(plan),
         "g.yaml:2:11: there is no node 'nobody'\n"
         "g.yaml:2:26: node 'sum' (fake.sum) has no output 'volum'; did you mean 'volume'?\n"
         "g.yaml:2:37: 'table' names no output; write table.table or table.transfer\n"
         "g.yaml:5:11: node 'source': unknown node type 'fake.sourc'; did you mean 'fake.source'?\n"
         "g.yaml:8:12: node 'ct': fake.source has no parameter 'sizes'; did you mean 'size'?\n"
         "g.yaml:8:29: node 'ct': parameter 'value' must be a number, not 'high'\n"
-        "g.yaml:8:43: node 'ct': parameter 'scalar': 'u9' is not one of u8, f32; did you mean 'u8'?\n"
-        "g.yaml:9:9: node 'lost': input 'volume' is not wired; it needs a Volume; ct.volume would fit\n"
-        "g.yaml:13:14: node 'sum': node 'ct' (fake.source) has no output 'volum'; did you mean 'volume'?\n"
+        "g.yaml:8:43: node 'ct': parameter 'scalar': 'u9' is not one of u8, f32; did you mean "
+        "'u8'?\n"
+        "g.yaml:9:9: node 'lost': input 'volume' is not wired; it needs a Volume; ct.volume would "
+        "fit\n"
+        "g.yaml:13:14: node 'sum': node 'ct' (fake.source) has no output 'volum'; did you mean "
+        "'volume'?\n"
         "g.yaml:13:24: node 'sum': fake.sum has no input 'c'; it has: a, b\n"
         "g.yaml:13:41: node 'sum': there is no node 'tc'; did you mean 'ct'?\n"
-        "g.yaml:16:19: node 'table': input 'source' takes Volume or Bricks, but all.image is Image; ct.volume would fit\n"
+        "g.yaml:16:19: node 'table': input 'source' takes Volume or Bricks, but all.image is "
+        "Image; ct.volume would fit\n"
         "g.yaml:19:20: node 'all': parameter 'vector' must be between 1 and 4096, not 0\n"
         "g.yaml:22:11: node 'writer': input 'volume' takes one wire, not 2\n"
         "g.yaml:22:31: node 'writer': 'ct' names no output; write ct.volume\n"
-        "g.yaml:25:19: node 'after': node 'writer' (fake.write) has no output 'volume'; it has none\n");
+        "g.yaml:25:19: node 'after': node 'writer' (fake.write) has no output 'volume'; it has "
+        "none\n");
     for (const Plan::Node& node : plan.nodes) EXPECT_FALSE(node.ok) << node.id;
 }
 
@@ -109,8 +114,10 @@ nodes:
   - { id: ct, type: fake.source }
   - { id: t, type: fake.table, in: { source: ct.volume } }
   - { id: add, type: fake.add, in: { volume: t.transfer } }
-)")), HasSubstr("g.yaml:5:46: node 'add': input 'volume' takes Volume, but t.transfer is TransferFunction; "
-                "ct.volume would fit"));
+)")),
+                HasSubstr("g.yaml:5:46: node 'add': input 'volume' takes Volume, but t.transfer is "
+                          "TransferFunction; "
+                          "ct.volume would fit"));
 }
 
 TEST(Check, NamesTheNodesAlongEachCycle) {
@@ -123,7 +130,8 @@ nodes:
   - { id: self, type: fake.sum, in: { a: self.volume, b: behind.volume } }
   - { id: apart, type: fake.source }
 )");
-    EXPECT_EQ(problems_of(plan),
+    EXPECT_EQ(
+        problems_of(plan),
         "g.yaml:3:11: node 'a': the wires run in a cycle: a -> b -> c -> a; remove one of them\n"
         "g.yaml:7:11: node 'self': the wires run in a cycle: self -> self; remove one of them\n");
     for (const Plan::Node& node : plan.nodes) EXPECT_EQ(node.ok, node.id == "apart") << node.id;
@@ -137,7 +145,8 @@ TEST(Check, ShortensALongCycle) {
                 std::to_string((i + 999) % 1000) + ".volume } }\n";
     Plan plan = check_text(text);
     ASSERT_EQ(plan.problems.size(), 1u);
-    EXPECT_THAT(plan.problems[0].message, HasSubstr("n0 -> n1 -> n2 -> n3 -> n4 -> ... 991 more ... -> "));
+    EXPECT_THAT(plan.problems[0].message,
+                HasSubstr("n0 -> n1 -> n2 -> n3 -> n4 -> ... 991 more ... -> "));
     EXPECT_LT(plan.problems[0].message.size(), 200u);
 }
 
@@ -159,12 +168,16 @@ nodes:
   - { id: later, type: fake.add, in: { volume: sum.volume } }
   - { id: bad, type: fake.fail, set: { when: describe } }
   - { id: missing, type: fake.source, set: { path: no.nrrd } }
-)", "/somewhere/g.yaml").graph(), r.registry);
+)",
+                                      "/somewhere/g.yaml")
+                          .graph(),
+                      r.registry);
     EXPECT_EQ(problems_of(plan),
-        "/somewhere/g.yaml:8:24: node 'sum': the volumes have different sizes: Volume 5 x 5 x 5 u8, spacing 1 x 1 x 1 "
-        "and Volume 6 x 6 x 6 f32, spacing 1 x 1 x 1\n"
-        "/somewhere/g.yaml:10:11: node 'bad': it failed; take another node\n"
-        "/somewhere/g.yaml:11:52: node 'missing': there is no file /somewhere/no.nrrd\n");
+              "/somewhere/g.yaml:8:24: node 'sum': the volumes have different sizes: Volume 5 x 5 "
+              "x 5 u8, spacing 1 x 1 x 1 "
+              "and Volume 6 x 6 x 6 f32, spacing 1 x 1 x 1\n"
+              "/somewhere/g.yaml:10:11: node 'bad': it failed; take another node\n"
+              "/somewhere/g.yaml:11:52: node 'missing': there is no file /somewhere/no.nrrd\n");
     EXPECT_EQ(plan.nodes[std::size_t(plan.find("b"))].outputs[0].volume()->dims, Index3(5));
     EXPECT_FALSE(plan.nodes[std::size_t(plan.find("later"))].ok);
     EXPECT_TRUE(plan.nodes[std::size_t(plan.find("b"))].ok);
@@ -205,16 +218,18 @@ nodes:
     for (Plan::Source s : plan.nodes[std::size_t(plan.find("all"))].inputs[0])
         from.push_back(plan.nodes[std::size_t(s.node)].id);
     EXPECT_THAT(from, ElementsAre("b", "a", "b"));
-    EXPECT_THAT(problems_of(check_text("voxloom: 1\nnodes: [{ id: g, type: fake.gather, in: { volumes: [] } }]\n")),
+    EXPECT_THAT(problems_of(check_text(
+                    "voxloom: 1\nnodes: [{ id: g, type: fake.gather, in: { volumes: [] } }]\n")),
                 HasSubstr("input 'volumes' has no wire; it needs at least one Volume"));
 }
 
 TEST(Check, AppliesOverridesAsIfTheyStoodInTheGraph) {
     CheckOptions options;
     options.overrides_base = "/base";
-    options.overrides = {"first.size=7", "all.vector=[3, 4]", "all.text=a: [b", "all.path_in=x/../y.raw",
-                         "all.boolean=true", "all.rows=[[1, 2]]", "all.texts=[a, 'b c']", "all.choice=blue",
-                         "all.real=1e-1", "all.path_out=o.txt"};
+    options.overrides = {"first.size=7",           "all.vector=[3, 4]", "all.text=a: [b",
+                         "all.path_in=x/../y.raw", "all.boolean=true",  "all.rows=[[1, 2]]",
+                         "all.texts=[a, 'b c']",   "all.choice=blue",   "all.real=1e-1",
+                         "all.path_out=o.txt"};
     std::string text = std::string(kChain) + "  - { id: all, type: fake.every }\n";
     Plan plan = check_text(text, options);
     EXPECT_EQ(problems_of(plan), "");
@@ -241,13 +256,18 @@ TEST(Check, SaysWhatIsWrongWithAnOverride) {
         return plan.problems.empty() ? "" : plan.problems[0].message;
     };
     EXPECT_EQ(problem("first.sise=3"),
-              "--set first.sise=3: node 'first' (fake.source) has no parameter 'sise'; did you mean 'size'?");
-    EXPECT_EQ(problem("frist.size=3"), "--set frist.size=3: there is no node 'frist'; did you mean 'first'?");
-    EXPECT_EQ(problem("first.size=x"), "--set first.size=x: parameter 'size' must be a whole number, not 'x'");
-    EXPECT_EQ(problem("first.size=-1"), "--set first.size=-1: parameter 'size' must be between 0 and 1e+09, not -1");
+              "--set first.sise=3: node 'first' (fake.source) has no parameter 'sise'; did you "
+              "mean 'size'?");
+    EXPECT_EQ(problem("frist.size=3"),
+              "--set frist.size=3: there is no node 'frist'; did you mean 'first'?");
+    EXPECT_EQ(problem("first.size=x"),
+              "--set first.size=x: parameter 'size' must be a whole number, not 'x'");
+    EXPECT_EQ(problem("first.size=-1"),
+              "--set first.size=-1: parameter 'size' must be between 0 and 1e+09, not -1");
     EXPECT_EQ(problem("size=3"), "--set size=3: write NODE.PARAM=VALUE");
     EXPECT_EQ(problem("first.size"), "--set first.size: write NODE.PARAM=VALUE");
-    EXPECT_EQ(check_text(kChain, options).problems[0].text("g.yaml"), "--set first.size: write NODE.PARAM=VALUE");
+    EXPECT_EQ(check_text(kChain, options).problems[0].text("g.yaml"),
+              "--set first.size: write NODE.PARAM=VALUE");
 }
 
 TEST(Check, WarnsWhenTheMemoryWouldNotDo) {
@@ -262,8 +282,11 @@ TEST(Check, WarnsWhenTheMemoryWouldNotDo) {
     EXPECT_EQ(check_text(kChain, options).warnings.size(), 1u);
     // What nobody asked for costs nothing.
     options.overrides = {};
-    EXPECT_THAT(check_text("voxloom: 1\noutputs: [b.volume]\nnodes:\n- { id: a, type: fake.source, set: { size: 99 } }\n"
-                           "- { id: b, type: fake.source, set: { size: 2 } }\n", options).warnings,
+    EXPECT_THAT(check_text("voxloom: 1\noutputs: [b.volume]\nnodes:\n- { id: a, type: fake.source, "
+                           "set: { size: 99 } }\n"
+                           "- { id: b, type: fake.source, set: { size: 2 } }\n",
+                           options)
+                    .warnings,
                 ElementsAre());
 }
 
@@ -280,7 +303,8 @@ TEST(Check, TakesTenThousandNodesInChainsAndFans) {
         for (const auto& port : plan.nodes[i].inputs)
             for (Plan::Source s : port) ASSERT_LT(s.node, int(i));
     // Ten thousand wrong names are no harder.
-    for (std::size_t at = 0; (at = text.find("n0.volume", at)) != std::string::npos;) text.replace(at, 2, "m0");
+    for (std::size_t at = 0; (at = text.find("n0.volume", at)) != std::string::npos;)
+        text.replace(at, 2, "m0");
     EXPECT_EQ(check_text(text).problems.size(), 5001u);
 }
 

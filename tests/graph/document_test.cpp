@@ -81,7 +81,8 @@ nodes:
   - { id: orbit, type: scene.camera, set: { azimuth: 30, note: 'it''s here' } }
 )";
 
-// --- reading ---------------------------------------------------------------------------------------
+// --- reading
+// ---------------------------------------------------------------------------------------
 
 TEST(DocumentRead, KeepsIdsWiresParametersAndPlaces) {
     Graph graph = Document::parse(kGraph, "dir/g.yaml").graph();
@@ -110,8 +111,11 @@ TEST(DocumentRead, KeepsIdsWiresParametersAndPlaces) {
 }
 
 TEST(DocumentRead, CountsColumnsInCharactersAndSkipsAByteOrderMark) {
-    Graph graph = Document::parse("\xef\xbb\xbfvoxloom: 1\r\nnodes: [{ id: a, set: { note: \"\xc3\xa9\xe2\x82\xac\", "
-                                  "x: 1 }, type: t }]\r\n").graph();
+    Graph graph =
+        Document::parse(
+            "\xef\xbb\xbfvoxloom: 1\r\nnodes: [{ id: a, set: { note: \"\xc3\xa9\xe2\x82\xac\", "
+            "x: 1 }, type: t }]\r\n")
+            .graph();
     ASSERT_EQ(graph.nodes.size(), 1u);
     EXPECT_EQ(graph.nodes[0].params[1].mark.line, 2);
     EXPECT_EQ(graph.nodes[0].params[1].mark.column, 37);
@@ -133,19 +137,24 @@ nodes:
   - id: Big
   - 7
 )");
-    EXPECT_EQ(all,
-              "g.yaml:2:1: unknown key 'ouputs'; did you mean 'outputs'?; a graph has: voxloom, outputs, nodes\n"
-              "g.yaml:6:5: node 'a': unknown key 'sett'; did you mean 'set'?; a node has: id, type, in, set, at\n"
-              "g.yaml:7:25: node 'a': input 'source' is 'd.e.f'; write node.port\n"
-              "g.yaml:8:9: node 'a': 'at' must be two numbers, such as [640, 120]\n"
-              "g.yaml:9:5: this node has no 'id'; give it a name\n"
-              "g.yaml:10:9: there are two nodes 'a', here and in line 4; give each an id of its own\n"
-              "g.yaml:12:14: node 'a': parameter 'x' has no value; give it one or remove the key (a text '~' "
-              "or 'null' needs quotes)\n"
-              "g.yaml:12:20: node 'a': parameter 'y' is a map; a parameter is a value or a list\n"
-              "g.yaml:13:5: this node has no 'type'; 'voxloom nodes' lists what there is\n"
-              "g.yaml:13:9: the id 'Big' is not a name of at most 100 lower-case letters, digits, '_' and '-'\n"
-              "g.yaml:14:5: a node must be a map with 'id' and 'type', this is a single value");
+    EXPECT_EQ(
+        all,
+        "g.yaml:2:1: unknown key 'ouputs'; did you mean 'outputs'?; a graph has: voxloom, outputs, "
+        "nodes\n"
+        "g.yaml:6:5: node 'a': unknown key 'sett'; did you mean 'set'?; a node has: id, type, in, "
+        "set, at\n"
+        "g.yaml:7:25: node 'a': input 'source' is 'd.e.f'; write node.port\n"
+        "g.yaml:8:9: node 'a': 'at' must be two numbers, such as [640, 120]\n"
+        "g.yaml:9:5: this node has no 'id'; give it a name\n"
+        "g.yaml:10:9: there are two nodes 'a', here and in line 4; give each an id of its own\n"
+        "g.yaml:12:14: node 'a': parameter 'x' has no value; give it one or remove the key (a text "
+        "'~' "
+        "or 'null' needs quotes)\n"
+        "g.yaml:12:20: node 'a': parameter 'y' is a map; a parameter is a value or a list\n"
+        "g.yaml:13:5: this node has no 'type'; 'voxloom nodes' lists what there is\n"
+        "g.yaml:13:9: the id 'Big' is not a name of at most 100 lower-case letters, digits, '_' "
+        "and '-'\n"
+        "g.yaml:14:5: a node must be a map with 'id' and 'type', this is a single value");
 }
 
 TEST(DocumentRead, NamesBothLinesOfADuplicateKey) {
@@ -156,27 +165,32 @@ TEST(DocumentRead, NamesBothLinesOfADuplicateKey) {
 }
 
 TEST(DocumentRead, RefusesWhatAGraphHasNoUseFor) {
-    EXPECT_THAT(refusal_of("voxloom: 1\nnodes: &x []\n"), StartsWith("g.yaml:2:8: anchors and aliases"));
+    EXPECT_THAT(refusal_of("voxloom: 1\nnodes: &x []\n"),
+                StartsWith("g.yaml:2:8: anchors and aliases"));
     EXPECT_THAT(refusal_of("voxloom: 1\nnodes: *x\n"), StartsWith("g.yaml:2:8: "));
     EXPECT_THAT(refusal_of("voxloom: !!int 1\n"), StartsWith("g.yaml:1:10: tags"));
     EXPECT_THAT(refusal_of("voxloom: 1\nnodes: !x\n"), HasSubstr("tags"));
     EXPECT_THAT(refusal_of("%YAML 1.2\n---\nvoxloom: 1\n"), StartsWith("g.yaml:1:1: directives"));
-    EXPECT_THAT(refusal_of("voxloom: 1\n---\nvoxloom: 1\n"), StartsWith("g.yaml:2:1: a second document"));
+    EXPECT_THAT(refusal_of("voxloom: 1\n---\nvoxloom: 1\n"),
+                StartsWith("g.yaml:2:1: a second document"));
     EXPECT_THAT(refusal_of("? voxloom\n: 1\n"), StartsWith("g.yaml:1:1: keys written with '?'"));
     EXPECT_THAT(refusal_of("voxloom: 1\nnodes: [a: b]\n"), HasSubstr("must stand in braces"));
     EXPECT_THAT(refusal_of("voxloom: 1\n[a]: b\n"), HasSubstr("a key must be a name"));
     EXPECT_THAT(refusal_of("voxloom: 1\nx: " + std::string(40, '[') + std::string(40, ']') + "\n"),
                 StartsWith("g.yaml:2:19: lists and maps are nested more than 16 deep"));
     EXPECT_THAT(refusal_of("voxloom: 1\nx: |2\n   a\n"), HasSubstr("indentation number"));
-    EXPECT_THAT(refusal_of("voxloom: 1\nx: \xff\n"), StartsWith("g.yaml:2:4: this byte is not UTF-8"));
-    EXPECT_THAT(refusal_of(std::string("voxloom: 1\nx: \0\n", 16)), HasSubstr("control character (0x00)"));
+    EXPECT_THAT(refusal_of("voxloom: 1\nx: \xff\n"),
+                StartsWith("g.yaml:2:4: this byte is not UTF-8"));
+    EXPECT_THAT(refusal_of(std::string("voxloom: 1\nx: \0\n", 16)),
+                HasSubstr("control character (0x00)"));
     EXPECT_THAT(refusal_of("voxloom: 1\nx: [1\n"), HasSubstr("g.yaml:"));
     EXPECT_THAT(refusal_of(std::string((16u << 20) + 1, ' ')), HasSubstr("at most 16.0 MiB"));
 }
 
 TEST(DocumentRead, NamesAVersionThatItDoesNotKnow) {
     EXPECT_EQ(refusal_of("voxloom: 2\nwhatever: 3\n"),
-              "g.yaml:1:10: 'voxloom: 2' is a version that this program does not know, it reads 1; use a newer "
+              "g.yaml:1:10: 'voxloom: 2' is a version that this program does not know, it reads 1; "
+              "use a newer "
               "program, or write 'voxloom: 1'");
     EXPECT_THAT(refusal_of("nodes: []\n"), HasSubstr("there is no 'voxloom: 1'"));
     EXPECT_THAT(refusal_of(""), HasSubstr("the text is empty"));
@@ -191,19 +205,22 @@ TEST(DocumentRead, SaysWhyAFileCannotBeOpened) {
     EXPECT_THAT(error_of([&] { Document::load(folder.path()); }), HasSubstr("is a folder"));
 }
 
-// --- parameters --------------------------------------------------------------------------------------
+// --- parameters
+// --------------------------------------------------------------------------------------
 
 TEST(ParseParam, ConvertsByTheKindOfTheParameter) {
     auto parse = [](const ParamSpec& spec, const std::string& yaml) {
         Graph graph =
-            Document::parse("voxloom: 1\nnodes: [{id: a, type: t, set: {x: " + yaml + "}}]\n").graph();
+            Document::parse("voxloom: 1\nnodes: [{id: a, type: t, set: {x: " + yaml + "}}]\n")
+                .graph();
         std::string reason;
         auto value = parse_param(spec, graph.nodes[0].params[0].yaml, reason);
         return value ? to_yaml(*value) : "! " + reason;
     };
     EXPECT_EQ(parse(param::boolean("x", false, "."), "true"), "true");
     EXPECT_EQ(parse(param::boolean("x", false, "."), "yes"), "! must be true or false, not 'yes'");
-    EXPECT_EQ(parse(param::boolean("x", false, "."), "'true'"), "! must be true or false, not the text \"true\"");
+    EXPECT_EQ(parse(param::boolean("x", false, "."), "'true'"),
+              "! must be true or false, not the text \"true\"");
     EXPECT_EQ(parse(param::integer("x", 0, "."), "12"), "12");
     EXPECT_EQ(parse(param::integer("x", 0, "."), "1e3"), "1000");
     EXPECT_EQ(parse(param::integer("x", 0, "."), "1.5"), "! must be a whole number");
@@ -225,10 +242,12 @@ TEST(ParseParam, ConvertsByTheKindOfTheParameter) {
     EXPECT_EQ(parse(param::rows("x", 2, {}, "."), "[[0, 1], 2]"),
               "! row 2 must be a list of numbers such as [1, 2], not '2'");
     EXPECT_EQ(parse(param::texts("x", {}, "."), "[a, 'b c', 3]"), "[a, \"b c\", \"3\"]");
-    EXPECT_EQ(parse(param::texts("x", {}, "."), "a"), "! must be a list of texts such as [a, b], not 'a'");
+    EXPECT_EQ(parse(param::texts("x", {}, "."), "a"),
+              "! must be a list of texts such as [a, b], not 'a'");
 }
 
-// --- edits ---------------------------------------------------------------------------------------------
+// --- edits
+// ---------------------------------------------------------------------------------------------
 
 std::string replaced(std::string text, const std::string& what, const std::string& by) {
     std::size_t at = text.find(what);
@@ -239,17 +258,27 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 TEST(DocumentEdit, ReplacesAValueAndNothingElse) {
     EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("view", "step", 0.1); }),
               replaced(kGraph, "0.50", "0.1"));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("ct", "path", std::string("a b.nrrd")); }),
-              replaced(kGraph, "head.nrrd", "a b.nrrd"));
+    EXPECT_EQ(
+        after(kGraph, [](Document& d) { d.set_param("ct", "path", std::string("a b.nrrd")); }),
+        replaced(kGraph, "head.nrrd", "a b.nrrd"));
     EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("orbit", "azimuth", std::int64_t(45)); }),
               replaced(kGraph, "30", "45"));
     EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("orbit", "note", std::string("x")); }),
               replaced(kGraph, "'it''s here'", "x"));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("view", "size", std::vector<double>{64, 512}); }),
+    EXPECT_EQ(after(kGraph,
+                    [](Document& d) {
+                        d.set_param("view", "size", std::vector<double>{64, 512});
+                    }),
               replaced(kGraph, "[512, ", "[64, "));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.set_param("view", "background", std::vector<double>{0, 0, 0, 0.5}); }),
+    EXPECT_EQ(after(kGraph,
+                    [](Document& d) {
+                        d.set_param("view", "background", std::vector<double>{0, 0, 0, 0.5});
+                    }),
               replaced(kGraph, "0, 1]\n    at", "0, 0.5]\n    at"));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.move_node("view", {1.5, -2}); }),
+    EXPECT_EQ(after(kGraph,
+                    [](Document& d) {
+                        d.move_node("view", {1.5, -2});
+                    }),
               replaced(kGraph, "[640, 120]", "[1.5, -2]"));
     EXPECT_EQ(after(kGraph, [](Document& d) { d.connect("ct", "other", "view", "source"); }),
               replaced(kGraph, "ct.volume", "ct.other"));
@@ -265,10 +294,14 @@ TEST(DocumentEdit, AddsEntriesInTheStyleOfTheirSurroundings) {
                        "scene.camera,\n      in: { source: ct.volume }, set"));
     EXPECT_EQ(after(kGraph, [](Document& d) { d.connect("orbit", "lights", "view", "lights"); }),
               replaced(kGraph, "orbit.camera\n", "orbit.camera\n      lights: orbit.lights\n"));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.move_node("ct", {0, 0}); }),
+    EXPECT_EQ(after(kGraph,
+                    [](Document& d) {
+                        d.move_node("ct", {0, 0});
+                    }),
               replaced(kGraph, "# the data\n", "# the data\n    at: [0, 0]\n"));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.add_node("tf", "scene.transfer", glm::dvec2(1, 2)); }),
-              std::string(kGraph) + "  - id: tf\n    type: scene.transfer\n    at: [1, 2]\n");
+    EXPECT_EQ(
+        after(kGraph, [](Document& d) { d.add_node("tf", "scene.transfer", glm::dvec2(1, 2)); }),
+        std::string(kGraph) + "  - id: tf\n    type: scene.transfer\n    at: [1, 2]\n");
     EXPECT_EQ(after(kGraph, [](Document& d) { d.connect("ct", "volume", "view", "source", true); }),
               replaced(kGraph, "source: ct.volume ", "source: [ct.volume, ct.volume] "));
 }
@@ -286,9 +319,12 @@ TEST(DocumentEdit, RemovesEntriesWithTheirLines) {
               replaced(kGraph, "      camera: orbit.camera\n", ""));
     EXPECT_EQ(after(kGraph, [](Document& d) { d.set_outputs({}); }),
               replaced(kGraph, "outputs: [view.image]   # what is shown\n", ""));
-    EXPECT_EQ(after(kGraph, [](Document& d) { d.remove_node("orbit"); }),
-              replaced(replaced(kGraph, "      camera: orbit.camera\n", ""),
-                       "  - { id: orbit, type: scene.camera, set: { azimuth: 30, note: 'it''s here' } }\n", ""));
+    EXPECT_EQ(
+        after(kGraph, [](Document& d) { d.remove_node("orbit"); }),
+        replaced(
+            replaced(kGraph, "      camera: orbit.camera\n", ""),
+            "  - { id: orbit, type: scene.camera, set: { azimuth: 30, note: 'it''s here' } }\n",
+            ""));
 }
 
 TEST(DocumentEdit, RenamesANodeWithItsWiresAndOutputs) {
@@ -325,18 +361,21 @@ nodes:
 
 TEST(DocumentEdit, WorksOnEveryLayout) {
     // No newline at the end.
-    EXPECT_EQ(after("voxloom: 1\nnodes:\n- id: a\n  type: t", [](Document& d) { d.set_param("a", "x", true); }),
+    EXPECT_EQ(after("voxloom: 1\nnodes:\n- id: a\n  type: t",
+                    [](Document& d) { d.set_param("a", "x", true); }),
               "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set: { x: true }");
     EXPECT_EQ(after("voxloom: 1\nnodes:\n- id: a\n  type: t\n- id: b\n  type: t",
                     [](Document& d) { d.remove_node("b"); }),
               "voxloom: 1\nnodes:\n- id: a\n  type: t");
     // Windows line ends.
-    EXPECT_EQ(after("voxloom: 1\r\nnodes:\r\n- id: a # c\r\n  type: t\r\n  set:\r\n    x: 1\r\n",
-                    [](Document& d) { d.set_param("a", "y", 0.5); }),
-              "voxloom: 1\r\nnodes:\r\n- id: a # c\r\n  type: t\r\n  set:\r\n    x: 1\r\n    y: 0.5\r\n");
+    EXPECT_EQ(
+        after("voxloom: 1\r\nnodes:\r\n- id: a # c\r\n  type: t\r\n  set:\r\n    x: 1\r\n",
+              [](Document& d) { d.set_param("a", "y", 0.5); }),
+        "voxloom: 1\r\nnodes:\r\n- id: a # c\r\n  type: t\r\n  set:\r\n    x: 1\r\n    y: 0.5\r\n");
     // Everything in one line.
-    EXPECT_EQ(after("{voxloom: 1, nodes: [{id: a, type: t}]}", [](Document& d) { d.add_node("b", "u"); }),
-              "{voxloom: 1, nodes: [{id: a, type: t}, { id: b, type: u }]}");
+    EXPECT_EQ(
+        after("{voxloom: 1, nodes: [{id: a, type: t}]}", [](Document& d) { d.add_node("b", "u"); }),
+        "{voxloom: 1, nodes: [{id: a, type: t}, { id: b, type: u }]}");
     EXPECT_EQ(after("{voxloom: 1}", [](Document& d) { d.add_node("b", "u"); }),
               "{voxloom: 1, nodes: [{ id: b, type: u }]}");
     // Keys without values, or with empty ones.
@@ -354,26 +393,39 @@ TEST(DocumentEdit, WorksOnEveryLayout) {
               "voxloom: 1 # one\nnodes:\n  - id: a\n    type: t\n");
     // Lists as lines.
     constexpr const char* lines =
-        "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    rows:  # pairs\n      - [0, 1]  # first\n"
+        "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    rows:  # pairs\n      - [0, 1]  # "
+        "first\n"
         "      - [2, 3]\n    z: 1\n";
-    EXPECT_EQ(after(lines, [](Document& d) { d.set_param("a", "rows", Rows{{0, 1}, {2, 5}}); }),
+    EXPECT_EQ(after(lines,
+                    [](Document& d) {
+                        d.set_param("a", "rows", Rows{{0, 1}, {2, 5}});
+                    }),
               replaced(lines, "[2, 3]", "[2, 5]"));
-    EXPECT_EQ(after(lines, [](Document& d) { d.set_param("a", "rows", Rows{{0, 1}, {2, 3}, {4, 4}}); }),
+    EXPECT_EQ(after(lines,
+                    [](Document& d) {
+                        d.set_param("a", "rows", Rows{{0, 1}, {2, 3}, {4, 4}});
+                    }),
               replaced(lines, "[2, 3]\n", "[2, 3]\n      - [4, 4]\n"));
-    EXPECT_EQ(after(lines, [](Document& d) { d.set_param("a", "rows", Rows{{2, 3}}); }),
+    EXPECT_EQ(after(lines,
+                    [](Document& d) {
+                        d.set_param("a", "rows", Rows{{2, 3}});
+                    }),
               replaced(lines, "      - [0, 1]  # first\n", ""));
     EXPECT_EQ(after(lines, [](Document& d) { d.set_param("a", "rows", Rows{}); }),
-              replaced(lines, "rows:  # pairs\n      - [0, 1]  # first\n      - [2, 3]\n", "rows: []  # pairs\n"));
+              replaced(lines, "rows:  # pairs\n      - [0, 1]  # first\n      - [2, 3]\n",
+                       "rows: []  # pairs\n"));
     // Texts over several lines.
-    EXPECT_EQ(after("voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    x: one\n      two # c\n    y: |\n      a\n\n      b\n"
-                    "    z: \"q\n      r\" # d\n",
-                    [](Document& d) {
-                        Document::Step step(d);
-                        d.set_param("a", "x", 1.0);
-                        d.set_param("a", "y", 2.0);
-                        d.set_param("a", "z", 3.0);
-                    }),
-              "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    x: 1 # c\n    y: 2\n    z: 3 # d\n");
+    EXPECT_EQ(
+        after("voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    x: one\n      two # c\n    y: "
+              "|\n      a\n\n      b\n"
+              "    z: \"q\n      r\" # d\n",
+              [](Document& d) {
+                  Document::Step step(d);
+                  d.set_param("a", "x", 1.0);
+                  d.set_param("a", "y", 2.0);
+                  d.set_param("a", "z", 3.0);
+              }),
+        "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    x: 1 # c\n    y: 2\n    z: 3 # d\n");
     // A key that goes from the line of the item's dash.
     EXPECT_EQ(after("voxloom: 1\nnodes:\n- set: { x: 1 }\n  id: a\n  type: t\n",
                     [](Document& d) { d.reset_param("a", "x"); }),
@@ -394,10 +446,36 @@ TEST(DocumentEdit, BreaksLinesThatWouldGrowTooLong) {
 }
 
 TEST(DocumentEdit, WritesEveryTextSoThatItReadsBack) {
-    for (std::string text : {"", "plain", "12", "1e5", "true", "Null", "~", "a: b", "# no comment", "- x", "[1]",
-                             "it's \"quoted\"", "back\\slash", "tab\tnew\nline\r", " space ", "\xc3\xa9\xe2\x82\xac",
-                             "*x", "&x", "!x", "%x", "@x", "`x", "{", "}", ",", "?", "a,b", "\x01\x7f"}) {
-        Document document = Document::parse("voxloom: 1\nnodes: [{ id: a, type: t, set: { y: 1 } }]\n");
+    for (std::string text : {"",
+                             "plain",
+                             "12",
+                             "1e5",
+                             "true",
+                             "Null",
+                             "~",
+                             "a: b",
+                             "# no comment",
+                             "- x",
+                             "[1]",
+                             "it's \"quoted\"",
+                             "back\\slash",
+                             "tab\tnew\nline\r",
+                             " space ",
+                             "\xc3\xa9\xe2\x82\xac",
+                             "*x",
+                             "&x",
+                             "!x",
+                             "%x",
+                             "@x",
+                             "`x",
+                             "{",
+                             "}",
+                             ",",
+                             "?",
+                             "a,b",
+                             "\x01\x7f"}) {
+        Document document =
+            Document::parse("voxloom: 1\nnodes: [{ id: a, type: t, set: { y: 1 } }]\n");
         document.set_param("a", "x", text);
         document.set_param("a", "list", std::vector<std::string>{text, text});
         const GraphNode node = Document::parse(document.text()).graph().nodes[0];
@@ -416,16 +494,23 @@ TEST(DocumentEdit, RefusesWhatDoesNotApplyAndStaysAsItWas) {
     };
     EXPECT_EQ(refused([](Document& d) { d.add_node("ct", "t"); }),
               "there is a node 'ct' already; take another id");
-    EXPECT_THAT(refused([](Document& d) { d.add_node("Big One", "t"); }), HasSubstr("'Big One' is no id"));
+    EXPECT_THAT(refused([](Document& d) { d.add_node("Big One", "t"); }),
+                HasSubstr("'Big One' is no id"));
     EXPECT_THAT(refused([](Document& d) { d.add_node("x", ""); }), HasSubstr("needs a type"));
     EXPECT_EQ(refused([](Document& d) { d.remove_node("vieww"); }),
               "there is no node 'vieww'; did you mean 'view'?");
     EXPECT_THAT(refused([](Document& d) { d.rename_node("ct", "view"); }), HasSubstr("already"));
-    EXPECT_THAT(refused([](Document& d) { d.set_param("no", "x", 1.0); }), HasSubstr("no node 'no'"));
-    EXPECT_THAT(refused([](Document& d) { d.set_param("ct", "x", std::string("\xff")); }), HasSubstr("UTF-8"));
-    EXPECT_THAT(refused([](Document& d) { d.connect("no", "x", "ct", "y"); }), HasSubstr("no node 'no'"));
+    EXPECT_THAT(refused([](Document& d) { d.set_param("no", "x", 1.0); }),
+                HasSubstr("no node 'no'"));
+    EXPECT_THAT(refused([](Document& d) { d.set_param("ct", "x", std::string("\xff")); }),
+                HasSubstr("UTF-8"));
+    EXPECT_THAT(refused([](Document& d) { d.connect("no", "x", "ct", "y"); }),
+                HasSubstr("no node 'no'"));
     EXPECT_THAT(refused([](Document& d) { d.move_node("ct", {NAN, 0}); }), HasSubstr("'ct'"));
-    EXPECT_THAT(refused([](Document& d) { d.set_outputs({{"no", "x"}}); }), HasSubstr("no node 'no'"));
+    EXPECT_THAT(refused([](Document& d) {
+                    d.set_outputs({{"no", "x"}});
+                }),
+                HasSubstr("no node 'no'"));
     // What is so already is no step.
     EXPECT_EQ(refused([](Document& d) { d.set_param("orbit", "azimuth", std::int64_t(30)); }), "");
     EXPECT_EQ(refused([](Document& d) { d.disconnect("ct", "nothing"); }), "");
@@ -453,13 +538,14 @@ TEST(DocumentEdit, MakesOneStepOfSeveralInAScope) {
     EXPECT_FALSE(document.can_redo());
 }
 
-// --- a long random sequence against a model ------------------------------------------------------------
+// --- a long random sequence against a model
+// ------------------------------------------------------------
 
 TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
     // What the graph should hold, kept apart from the document's own code.
     struct Node {
-        std::map<std::string, std::string> params;                // as YAML
-        std::map<std::string, std::vector<std::string>> inputs;   // node.port
+        std::map<std::string, std::string> params;               // as YAML
+        std::map<std::string, std::vector<std::string>> inputs;  // node.port
         std::string at;
         bool operator==(const Node&) const = default;
     };
@@ -469,31 +555,37 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
         bool operator==(const Model&) const = default;
     };
     auto model_of = [](const Graph& graph) {
-        std::function<std::string(const GraphParam::Yaml&)> text = [&](const GraphParam::Yaml& yaml) {
-            double number;
-            if (yaml.kind == GraphParam::Yaml::Kind::plain && parse_number(yaml.text, number)) return shortest(number);
-            if (yaml.kind == GraphParam::Yaml::Kind::plain && yaml.text == "true") return yaml.text;
-            if (yaml.kind != GraphParam::Yaml::Kind::list) return to_yaml(ParamValue(yaml.text));
-            std::vector<std::string> items;
-            for (const auto& item : yaml.items) items.push_back(text(item));
-            return "[" + join(items, ", ") + "]";
-        };
+        std::function<std::string(const GraphParam::Yaml&)> text =
+            [&](const GraphParam::Yaml& yaml) {
+                double number;
+                if (yaml.kind == GraphParam::Yaml::Kind::plain && parse_number(yaml.text, number))
+                    return shortest(number);
+                if (yaml.kind == GraphParam::Yaml::Kind::plain && yaml.text == "true")
+                    return yaml.text;
+                if (yaml.kind != GraphParam::Yaml::Kind::list)
+                    return to_yaml(ParamValue(yaml.text));
+                std::vector<std::string> items;
+                for (const auto& item : yaml.items) items.push_back(text(item));
+                return "[" + join(items, ", ") + "]";
+            };
         Model model;
         for (const GraphNode& node : graph.nodes) {
             Node& n = model.nodes[node.id];
             for (const GraphParam& param : node.params) n.params[param.key] = text(param.yaml);
             for (const GraphInput& input : node.inputs)
-                for (const WireEnd& end : input.from) n.inputs[input.port].push_back(end.node + "." + end.port);
+                for (const WireEnd& end : input.from)
+                    n.inputs[input.port].push_back(end.node + "." + end.port);
             if (node.at) n.at = shortest(node.at->x) + " " + shortest(node.at->y);
         }
         for (const WireEnd& end : graph.outputs) model.outputs.push_back(end.node + "." + end.port);
         return model;
     };
 
-    for (const char* original : {kGraph, "voxloom: 1\nnodes: []",
-                                 "{ voxloom: 1, # c\r\n nodes: [\r\n { id: a, type: t }, # x\r\n { id: b, type: t } ] }",
-                                 "nodes:\n    # first\n-   type: t\n    in: {}\n    set:\n       p0: [1,\n 2]  # two\n"
-                                 "       p1:\n       - 1\n       -\n         - 2\n    id: a\n#last\nvoxloom: 1\n"}) {
+    for (const char* original :
+         {kGraph, "voxloom: 1\nnodes: []",
+          "{ voxloom: 1, # c\r\n nodes: [\r\n { id: a, type: t }, # x\r\n { id: b, type: t } ] }",
+          "nodes:\n    # first\n-   type: t\n    in: {}\n    set:\n       p0: [1,\n 2]  # two\n"
+          "       p1:\n       - 1\n       -\n         - 2\n    id: a\n#last\nvoxloom: 1\n"}) {
         Document document = Document::parse(original);
         Model model = model_of(document.graph());
         std::vector<Model> done, undone;
@@ -503,7 +595,10 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
             state = state * 6364136223846793005u + 1442695040888963407u;
             return (state >> 33) % n;
         };
-        auto any_node = [&] { return std::next(model.nodes.begin(), std::ptrdiff_t(random(model.nodes.size())))->first; };
+        auto any_node = [&] {
+            return std::next(model.nodes.begin(), std::ptrdiff_t(random(model.nodes.size())))
+                ->first;
+        };
         for (int i = 0; i < 2500; ++i) {
             std::uint64_t what = random(12);
             if (what == 0 && document.can_undo()) {
@@ -530,7 +625,8 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
             if (model.nodes.size() < 2 || (what == 2 && model.nodes.size() < 5)) {
                 std::string id = "n" + std::to_string(random(100000));
                 if (model.nodes.count(id)) continue;
-                document.add_node(id, "fake.add", random(2) ? std::optional(glm::dvec2(1, 2)) : std::nullopt);
+                document.add_node(id, "fake.add",
+                                  random(2) ? std::optional(glm::dvec2(1, 2)) : std::nullopt);
                 model.nodes[id].at = document.graph().find(id)->at ? "1 2" : "";
             } else if (what == 3 && random(2)) {
                 std::string id = any_node();
@@ -540,7 +636,8 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 std::erase_if(model.outputs, of_node);
                 for (auto& [name, node] : model.nodes) {
                     for (auto& [port, ends] : node.inputs) std::erase_if(ends, of_node);
-                    std::erase_if(node.inputs, [](const auto& input) { return input.second.empty(); });
+                    std::erase_if(node.inputs,
+                                  [](const auto& input) { return input.second.empty(); });
                 }
             } else if (what == 4) {
                 std::string id = any_node(), to = "r" + std::to_string(random(100000));
@@ -560,12 +657,23 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 std::string id = any_node(), key = "p" + std::to_string(random(3));
                 ParamValue value;
                 switch (random(6)) {
-                    case 0: value = double(random(1000)) / 7; break;
-                    case 1: value = std::vector<double>(random(4), double(random(9))); break;
-                    case 2: value = Rows(random(3), std::vector<double>(random(3), 0.5)); break;
-                    case 3: value = std::string(random(3), "\n#'\"aX"[random(6)]); break;
-                    case 4: value = std::vector<std::string>(random(3), "x y"); break;
-                    default: value = true;
+                    case 0:
+                        value = double(random(1000)) / 7;
+                        break;
+                    case 1:
+                        value = std::vector<double>(random(4), double(random(9)));
+                        break;
+                    case 2:
+                        value = Rows(random(3), std::vector<double>(random(3), 0.5));
+                        break;
+                    case 3:
+                        value = std::string(random(3), "\n#'\"aX"[random(6)]);
+                        break;
+                    case 4:
+                        value = std::vector<std::string>(random(3), "x y");
+                        break;
+                    default:
+                        value = true;
                 }
                 document.set_param(id, key, value);
                 model.nodes[id].params[key] = to_yaml(value);
@@ -574,7 +682,8 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 document.reset_param(id, key);
                 model.nodes[id].params.erase(key);
             } else if (what <= 9) {
-                std::string from = any_node(), to = any_node(), port = "i" + std::to_string(random(2));
+                std::string from = any_node(), to = any_node(),
+                            port = "i" + std::to_string(random(2));
                 bool append = random(2);
                 document.connect(from, "out", to, port, append);
                 auto& ends = model.nodes[to].inputs[port];
@@ -598,7 +707,9 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
                 }
                 document.set_outputs(outputs);
             }
-            ASSERT_TRUE(model_of(document.graph()) == model) << "edit " << i << "\n" << text_before << "---\n" << document.text();
+            ASSERT_TRUE(model_of(document.graph()) == model) << "edit " << i << "\n"
+                                                             << text_before << "---\n"
+                                                             << document.text();
             if (document.text() != text_before) {
                 done.push_back(before);
                 undone.clear();
@@ -617,7 +728,8 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
     }
 }
 
-// --- files -----------------------------------------------------------------------------------------------
+// --- files
+// -----------------------------------------------------------------------------------------------
 
 TEST(DocumentFile, SavesThroughATemporaryNameAndReadsBack) {
     testing::TempFolder folder;
@@ -641,9 +753,11 @@ TEST(DocumentFile, SavesThroughATemporaryNameAndReadsBack) {
 TEST(DocumentFile, LeavesNothingBehindWhereItCannotSave) {
     testing::TempFolder folder;
     Document document = Document::parse(kGraph);
-    EXPECT_THAT(error_of([&] { document.save(folder.path() / "no" / "g.yaml"); }), HasSubstr("cannot be written"));
+    EXPECT_THAT(error_of([&] { document.save(folder.path() / "no" / "g.yaml"); }),
+                HasSubstr("cannot be written"));
     std::filesystem::create_directories(folder.path() / "folder.yaml");
-    EXPECT_THAT(error_of([&] { document.save(folder.path() / "folder.yaml"); }), HasSubstr("cannot be written"));
+    EXPECT_THAT(error_of([&] { document.save(folder.path() / "folder.yaml"); }),
+                HasSubstr("cannot be written"));
     std::size_t files = 0;
     for (auto& entry : std::filesystem::directory_iterator(folder.path())) files += entry.exists();
     EXPECT_EQ(files, 1u);

@@ -30,7 +30,8 @@ double first_voxel(const Volume& volume) {
     if (volume.desc().voxels() == 0) return 0;
     Buffer voxel(volume.desc().voxel_bytes());
     volume.read({Index3(0), Index3(1)}, voxel.bytes());
-    return with_type(volume.desc().type, [&](auto t) { return double(voxel.as<decltype(t)>()[0]); });
+    return with_type(volume.desc().type,
+                     [&](auto t) { return double(voxel.as<decltype(t)>()[0]); });
 }
 
 // Every fake volume is constant, so its first voxel is all there is to compute.
@@ -55,13 +56,14 @@ NodeType source() {
                    param::real("value", 1, "Of every voxel."),
                    param::choice("scalar", {"u8", "f32"}, "f32", "Scalar type."),
                    param::path_in("path", "A file that must exist, where one is given."),
-                   param::integer("threads", 0, "Changes nothing but the cost.").range(0, 64)
+                   param::integer("threads", 0, "Changes nothing but the cost.")
+                       .range(0, 64)
                        .changes(Affects::cost)};
     type.describe = [](Description& d) {
         if (d.params().was_set("path") && !std::filesystem::exists(d.params().path("path")))
             d.problem("there is no file " + d.params().path("path").string(), "path");
-        d.output("volume", cube(d.params().integer("size"),
-                                *scalar_type_named(d.params().text("scalar"))));
+        d.output("volume",
+                 cube(d.params().integer("size"), *scalar_type_named(d.params().text("scalar"))));
     };
     type.evaluate = [](Evaluation& e) {
         e.output("volume", filled(cube(e.params().integer("size"),
@@ -78,9 +80,9 @@ NodeType add() {
     type.doc = "Adds a number to every voxel.";
     type.inputs = {{"volume", PortType::volume, "What is added to."}};
     type.outputs = {{"volume", PortType::volume, "The sums."}};
-    type.params = {param::real("amount", 1, "What is added.").range(-1000, 1000),
-                   param::real("milliseconds", 0, "Time that it takes.").range(0, 1e6)
-                       .changes(Affects::cost)};
+    type.params = {
+        param::real("amount", 1, "What is added.").range(-1000, 1000),
+        param::real("milliseconds", 0, "Time that it takes.").range(0, 1e6).changes(Affects::cost)};
     type.describe = [](Description& d) { d.output("volume", *d.input("volume")); };
     type.evaluate = [](Evaluation& e) {
         auto volume = e.input<Volume>("volume");
@@ -92,7 +94,8 @@ NodeType add() {
         }
         e.count("additions");
         e.measure("amount", e.params().real("amount"));
-        e.output("volume", filled(volume->desc(), first_voxel(*volume) + e.params().real("amount")));
+        e.output("volume",
+                 filled(volume->desc(), first_voxel(*volume) + e.params().real("amount")));
     };
     return type;
 }
@@ -181,7 +184,9 @@ NodeType every() {
                    param::list("list", {}, "Numbers."),
                    param::rows("rows", 2, {}, "Pairs of numbers."),
                    param::texts("texts", {}, "Texts.")};
-    type.describe = [](Description& d) { d.output("image", ImageDesc{d.params().size2("vector")}); };
+    type.describe = [](Description& d) {
+        d.output("image", ImageDesc{d.params().size2("vector")});
+    };
     type.evaluate = [](Evaluation& e) {
         auto image = std::make_shared<Image>(e.params().size2("vector"), Image::Format::rgba8);
         for (std::byte& b : image->bytes()) b = std::byte(e.params().boolean("boolean") ? 255 : 0);
