@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 
 #include "core/base/buffer.h"
 
@@ -22,6 +24,13 @@ T narrowed(double v) {
         v = v < lo ? lo : v > hi ? hi : v;
         return T(round_half_to_even(v));
     }
+}
+
+template <class From, class To>
+void clamp_integers(const From* from, std::size_t count, To* to) {
+    using Wide = std::conditional_t<sizeof(From) < 4 && sizeof(To) < 4, std::int32_t, std::int64_t>;
+    constexpr auto lo = Wide(std::numeric_limits<To>::lowest()), hi = Wide(std::numeric_limits<To>::max());
+    for (std::size_t i = 0; i < count; ++i) to[i] = To(std::clamp(Wide(from[i]), lo, hi));
 }
 
 }  // namespace
@@ -45,6 +54,16 @@ void convert(ScalarType from_type, const std::byte* from, ScalarType to_type, st
              std::size_t count) {
     if (from_type == to_type) {
         std::memcpy(to, from, count * bytes_of(from_type));
+        return;
+    }
+    if (!is_float(from_type) && !is_float(to_type)) {  // several times faster than through double
+        with_type(from_type, [&](auto f) {
+            with_type(to_type, [&](auto t) {
+                if constexpr (std::is_integral_v<decltype(f)> && std::is_integral_v<decltype(t)>)
+                    clamp_integers(reinterpret_cast<const decltype(f)*>(from), count,
+                                   reinterpret_cast<decltype(t)*>(to));
+            });
+        });
         return;
     }
     constexpr std::size_t kChunk = 512;
