@@ -1,5 +1,6 @@
 #include "core/gpu/program.h"
 
+#include <algorithm>
 #include <cctype>
 #include <map>
 
@@ -11,10 +12,8 @@ namespace voxloom::gpu {
 namespace {
 
 Object compile(GLenum stage, const std::vector<Module>& modules) {
-    // #line gives every module a string number of its own.
     std::string text = "#version 450 core\n";
-    for (std::size_t i = 0; i < modules.size(); ++i)
-        text += fmt::format("#line 1 {}\n{}\n", i, modules[i].text);
+    for (const Module& m : modules) text += m.text + "\n";
     const char* pointer = text.c_str();
     Object shader(glCreateShader(stage), [](GLuint n) { glDeleteShader(n); });
     glShaderSource(shader.name(), 1, &pointer, nullptr);
@@ -57,19 +56,34 @@ std::string readable_log(std::string_view log, const std::vector<Module>& module
         log.remove_prefix(std::min(log.size(), line.size() + 1));
         if (line.empty()) continue;
         if (!out.empty()) out += "; ";
-        // The first "N:M" or "N(M)" with N a module's position.
-        std::size_t i = 0;
-        while (i < line.size() && !std::isdigit(static_cast<unsigned char>(line[i]))) ++i;
-        std::size_t index = 0, j = i;
-        while (j < line.size() && std::isdigit(static_cast<unsigned char>(line[j])) && index < 10000)
-            index = index * 10 + std::size_t(line[j++] - '0');
-        if (j > i && j < line.size() && (line[j] == ':' || line[j] == '(') && index < modules.size()) {
-            out += line.substr(0, i);
-            out += modules[index].name;
-            out += line.substr(j);
-        } else {
-            out += line;
+        // The first "S:L" or "S(L)": string and line.
+        auto number = [&](std::size_t& i) {
+            std::size_t n = 0;
+            while (i < line.size() && std::isdigit(static_cast<unsigned char>(line[i])) && n < 1000000)
+                n = n * 10 + std::size_t(line[i++] - '0');
+            return n;
+        };
+        const std::size_t begin = std::min(line.find_first_of("0123456789"), line.size());
+        std::size_t at = begin;
+        number(at);
+        std::size_t in_text = 0;
+        if (at < line.size() && (line[at] == ':' || line[at] == '(')) in_text = number(++at);
+        // Lines count from 1; the first one is #version.
+        const Module* module = nullptr;
+        std::size_t start = 2;
+        for (const Module& m : modules) {
+            const std::size_t lines = std::size_t(std::ranges::count(m.text, '\n')) + 1;
+            if (in_text >= start && in_text < start + lines) {
+                module = &m;
+                break;
+            }
+            start += lines;
         }
+        if (module)
+            out += fmt::format("{}{}:{}{}", line.substr(0, begin), module->name, in_text - start + 1,
+                               line.substr(at));
+        else
+            out += line;
     }
     return out;
 }

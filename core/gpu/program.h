@@ -42,8 +42,8 @@ using ProgramPtr = std::shared_ptr<const Program>;
 // Throws Error with module, line and the compiler's words. [OpenGL thread]
 ProgramPtr program(const std::vector<Module>& vertex, const std::vector<Module>& fragment);
 
-// "name:line: words" for every "string(line) ..." or "string:line ..." of a compiler's log, in which
-// string is the module's position.
+// A compiler's log with module and line in place of the line of the whole text, in which the modules
+// stand one behind the other after #version. (Drivers differ in what they make of #line.)
 std::string readable_log(std::string_view log, const std::vector<Module>& modules);
 
 }  // namespace voxloom::gpu

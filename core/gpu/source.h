@@ -35,10 +35,12 @@ struct VoxelSource {
     std::vector<SourceTexture> textures;
 };
 
-// GLSL that defines   vec4 reconstruct(vec3 p)   and   vec3 gradient(vec3 p)   itself, for data that
-// brings its own kernels (lattices). gradient is per index step, in the units of x.
+// What can be sampled. With own kernels (lattices) the GLSL also defines
+//     vec4 reconstruct(vec3 p)     and     vec3 gradient(vec3 p)     per index step, in the units of x
+// and the parameters for reconstruction and gradients do not apply.
 struct FieldSource {
-    VoxelSource voxels;       // its glsl holds both functions; reconstruction parameters do not apply
+    VoxelSource voxels;
+    bool own_kernels = false;
 };
 
 struct SourceRequest {

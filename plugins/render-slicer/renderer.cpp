@@ -213,7 +213,7 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
         p.range = {p.range.min - w, p.range.max + w};
     }
 
-    if (uses_gradient(scene) && s.gradient_stored)
+    if (uses_gradient(scene) && s.gradient_stored && !p.field->own_kernels)
         p.gradient = keep.get<Prepared::Stored>(
             owner, key("gradient", s.gradient, desc.color ? -1 : s.component), [&](std::uint64_t& bytes) {
                 ev.progress(0.6, "computing gradients");
@@ -313,8 +313,10 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
                              "reconstruction-tricubic"};
     const Module kernel = module(kernels[int(s.reconstruction)]);
     std::vector<Module> parts = {{"choices", choices}, module("ray"), voxels.glsl};
-    if (!voxels.linear) parts.push_back(module("linear-from-voxels"));
-    parts.push_back(kernel);
+    if (!p.field->own_kernels) {
+        if (!voxels.linear) parts.push_back(module("linear-from-voxels"));
+        parts.push_back(kernel);
+    }
     parts.push_back(module("scalar"));
     auto second_texture = [&](const std::string& prefix) {
         parts.push_back(over(gpu::dense_module(), prefix));
@@ -324,7 +326,7 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
         if (p.gradient) {
             second_texture("gradient");
             parts.push_back(module("gradient-stored"));
-        } else {
+        } else if (!p.field->own_kernels) {
             parts.push_back(module(s.gradient == S::Gradient::central ? "gradient-central"
                                                                       : "gradient-smoothed"));
         }
