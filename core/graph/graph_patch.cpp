@@ -172,7 +172,8 @@ class Patcher {
             if (gone)
                 removed.push_back(int(i));
             else
-                patch_node(root_.items[std::size_t(list)].items[i], from[i], to[k++]);
+                patch_node(root_.items[std::size_t(list)].items[i], from[i], to[k++],
+                           i + 1 == from.size());
         }
         if (!removed.empty() && removed.size() == from.size())
             replace_value(root_, list, "[]");
@@ -211,8 +212,10 @@ class Patcher {
         }
     }
 
-    void patch_node(const YamlNode& map, const GraphNode& from, const GraphNode& to) {
-        if (same(from, to)) return;
+    // The last node is written anew even unchanged: a block text that ends it without a line break
+    // would gain one from what is added behind.
+    void patch_node(const YamlNode& map, const GraphNode& from, const GraphNode& to, bool last) {
+        if (same(from, to) && (surgical_ || !last)) return;
         if (!surgical_) {
             std::vector<std::string> lines = lines_of(to);
             std::string anew = map.flow ? "{ " + join(lines, ", ") + " }"

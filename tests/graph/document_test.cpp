@@ -426,6 +426,10 @@ TEST(DocumentEdit, WorksOnEveryLayout) {
                   d.set_param("a", "z", 3.0);
               }),
         "voxloom: 1\nnodes:\n- id: a\n  type: t\n  set:\n    x: 1 # c\n    y: 2\n    z: 3 # d\n");
+    // A block text at the very end, which would gain a line break.
+    EXPECT_EQ(after("voxloom: 1\nnodes:\n- id: a\n  type: |\n    t",
+                    [](Document& d) { d.add_node("b", "u"); }),
+              "voxloom: 1\nnodes:\n- id: a\n  type: t\n- id: b\n  type: u");
     // A key that goes from the line of the item's dash.
     EXPECT_EQ(after("voxloom: 1\nnodes:\n- set: { x: 1 }\n  id: a\n  type: t\n",
                     [](Document& d) { d.reset_param("a", "x"); }),
