@@ -132,8 +132,10 @@ class TreeBuilder final : public YAML::EventHandler {
             consumed_ = node.end = at + length;
         } else {
             std::size_t colon = skip_blank(text_, consumed_);
-            if (expects_value() && colon < text_.size() && text_[colon] == ':')
-                consumed_ = colon + 1;
+            bool there = colon < text_.size() && text_[colon] == ':';
+            if (expects_value() && !there && !stack_.back().flow)
+                throw Refused{stack_.back().keys.back().begin, "this key has no ':' behind it"};
+            if (expects_value() && there) consumed_ = colon + 1;
             node = start(consumed_);
             node.end = consumed_;
         }

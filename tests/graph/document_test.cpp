@@ -175,6 +175,7 @@ TEST(DocumentRead, RefusesWhatAGraphHasNoUseFor) {
                 StartsWith("g.yaml:2:1: a second document"));
     EXPECT_THAT(refusal_of("? voxloom\n: 1\n"), StartsWith("g.yaml:1:1: keys written with '?'"));
     EXPECT_THAT(refusal_of("voxloom: 1\nnodes: [a: b]\n"), HasSubstr("must stand in braces"));
+    EXPECT_EQ(refusal_of("voxloom: 1\nnodes"), "g.yaml:2:1: this key has no ':' behind it");
     EXPECT_THAT(refusal_of("voxloom: 1\n[a]: b\n"), HasSubstr("a key must be a name"));
     EXPECT_THAT(refusal_of("voxloom: 1\nx: " + std::string(40, '[') + std::string(40, ']') + "\n"),
                 StartsWith("g.yaml:2:19: lists and maps are nested more than 16 deep"));
