@@ -5,7 +5,7 @@
 
 #include "core/base/text.h"
 #include "core/graph/params.h"
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 
 namespace voxloom {
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <limits>
 
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 #include "plugins/writers/volume_header.h"
 #include "plugins/writers/writers.h"
 #include "tests/support/run_node.h"

@@ -3,7 +3,7 @@
 
 #include "core/graph/node.h"
 #include "plugins/writers/image_codec.h"
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 #include "plugins/writers/writers.h"
 
 namespace voxloom {

@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 
 #include "core/graph/node.h"
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 #include "plugins/writers/table_text.h"
 #include "plugins/writers/writers.h"
 

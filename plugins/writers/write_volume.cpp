@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/graph/node.h"
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 #include "plugins/writers/volume_header.h"
 #include "plugins/writers/writers.h"
 

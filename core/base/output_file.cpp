@@ -1,4 +1,4 @@
-#include "plugins/writers/output_file.h"
+#include "core/base/output_file.h"
 
 #include <fcntl.h>
 #include <unistd.h>

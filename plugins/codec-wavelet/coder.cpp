@@ -1,0 +1,48 @@
+#include "plugins/codec-wavelet/coder.h"
+
+#include <algorithm>
+
+#include "core/base/error.h"
+#include "plugins/codec-wavelet/dense_coder.h"
+#include "plugins/codec-wavelet/paper_coder.h"
+
+namespace voxloom::wavelet {
+
+std::string_view name_of(CoderKind kind) {
+    constexpr std::string_view kNames[] = {"paper", "dense", "fast"};
+    return kNames[int(kind)];
+}
+
+std::unique_ptr<Coder> make_coder(CoderKind kind, std::span<const std::byte> tables) {
+    return kind == CoderKind::paper ? make_paper_coder() : make_dense_coder(tables);
+}
+
+namespace {
+
+// Calls row(first number, count) for every row of every band of details.
+template <class Row>
+void for_each_row(const Details& d, const Row& row) {
+    for (int mask : kBandOrder) {
+        const Band b = d.shape.band(mask);
+        if (!d.shape.has(b)) continue;
+        for (int z = 0; z < b.dims.z; ++z)
+            for (int y = 0; y < b.dims.y; ++y)
+                row(d.q + d.shape.at(b.lo + glm::ivec3(0, y, z)), std::size_t(b.dims.x));
+    }
+}
+
+}  // namespace
+
+bool all_zero(const Details& details) {
+    std::int32_t any = 0;
+    for_each_row(details, [&](const std::int32_t* q, std::size_t n) {
+        for (std::size_t i = 0; i < n; ++i) any |= q[i];
+    });
+    return any == 0;
+}
+
+void clear_bands(Details& details) {
+    for_each_row(details, [](std::int32_t* q, std::size_t n) { std::fill_n(q, n, 0); });
+}
+
+}  // namespace voxloom::wavelet

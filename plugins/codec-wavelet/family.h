@@ -1,0 +1,64 @@
+// One step of refinement: a parent's low band and seven (or fewer) bands of details give its children.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+
+#include "plugins/codec-wavelet/lifting.h"
+
+namespace voxloom::wavelet {
+
+// Bit a of a band's mask: high along axis a. Mask 0 is the low band.
+struct Band {
+    int mask = 0;
+    glm::ivec3 lo{0}, dims{0};  // where it stands in the family's box
+};
+
+struct Shape {
+    glm::ivec3 dims{1};    // voxels of the children together
+    glm::bvec3 halved{false};
+
+    glm::ivec3 low() const { return low_dims(dims, halved); }
+    std::size_t voxels() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
+    std::size_t at(glm::ivec3 i) const {
+        return (std::size_t(i.z) * std::size_t(dims.y) + std::size_t(i.y)) * std::size_t(dims.x) + std::size_t(i.x);
+    }
+    Band band(int mask) const {
+        Band b{mask, glm::ivec3(0), low()};
+        for (int a = 0; a < 3; ++a)
+            if (mask >> a & 1) {
+                b.lo[a] = b.dims[a];
+                b.dims[a] = dims[a] - b.dims[a];
+            }
+        return b;
+    }
+    bool has(const Band& b) const { return b.dims.x > 0 && b.dims.y > 0 && b.dims.z > 0; }
+    friend bool operator==(const Shape& a, const Shape& b) { return a.dims == b.dims && a.halved == b.halved; }
+};
+
+// The order in which bands are coded: those with one high axis first, since the others lean on them.
+inline constexpr std::array<int, 7> kBandOrder = {1, 2, 4, 3, 5, 6, 7};
+
+// Norms of the synthesis functions of the 5/3, squared, after j halvings of an axis: scaling
+// (2N^2 + 1) / (3N) with N = 2^j, wavelet 23/32, 59/64, ... tending to 0.1875 * 2^j.
+double scaling_norm(int j);
+double wavelet_norm(int j);
+
+// Norm of a coefficient of a band on level 0. fine_stride is the children's: 2^(times halved).
+double band_norm(int mask, glm::ivec3 fine_stride, glm::bvec3 halved);
+
+// The quantised details of one component of a family: what an entropy coder turns into bytes.
+struct Details {
+    Shape shape;
+    // shape.voxels() numbers in the layout of lifting.h; the low band is not looked at.
+    std::int32_t* q = nullptr;
+    // The parent's decoded samples, shape.low() of them: known to the decoder, so contexts may use it.
+    const std::int32_t* low = nullptr;
+    std::array<double, 8> step{1, 1, 1, 1, 1, 1, 1, 1};  // of each mask
+    bool finest = false;  // the children are level 0
+};
+
+}  // namespace voxloom::wavelet

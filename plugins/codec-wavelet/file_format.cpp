@@ -1,0 +1,384 @@
+#include "plugins/codec-wavelet/file_format.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+
+#include "core/base/error.h"
+#include "core/base/hash.h"
+#include "core/base/output_file.h"
+#include "plugins/codec-wavelet/adaptive_number.h"
+#include "plugins/codec-wavelet/byte_io.h"
+
+namespace voxloom::wavelet {
+
+namespace {
+
+constexpr char kMagic[8] = {'v', 'o', 'x', 'w', 'a', 'v', 'e', '\n'};
+constexpr std::uint32_t kEndian = 0x01020304;
+// magic, version, byte order, bytes of head and payload, hash of the 32 bytes before and the head
+constexpr std::size_t kPreamble = sizeof kMagic + 4 + 4 + 8 + 8 + 8;
+
+// --- statistics: columns of small numbers, each coded as the difference from the one before ---------
+
+void encode_column(std::span<const std::uint16_t> column, ByteWriter& writer) {
+    Bytes part;
+    RangeEncoder encoder(part);
+    AdaptiveNumber model;
+    std::uint16_t last = 0;
+    for (const std::uint16_t v : column) {
+        const auto d = std::int16_t(v - last);
+        model.code(encoder, std::uint16_t(d < 0 ? ~(d * 2) : d * 2));
+        last = v;
+    }
+    encoder.finish();
+    writer.block(part);
+}
+std::vector<std::uint16_t> decode_column(std::size_t count, ByteReader& reader) {
+    RangeDecoder decoder(reader.block());
+    AdaptiveNumber model;
+    std::vector<std::uint16_t> column(count);
+    std::uint16_t last = 0;
+    for (std::uint16_t& v : column) {
+        const auto folded = model.code(decoder, std::uint16_t(0));
+        v = last = std::uint16_t(last + (folded & 1 ? ~(folded >> 1) : folded >> 1));
+    }
+    return column;
+}
+
+// Errors on a logarithmic scale, 128 steps an octave: 0.3 % either way, and 0 is 0.
+std::uint16_t error_code(double error, bool up) {
+    if (!(error > 0)) return 0;
+    const double x = (std::log2(error) + 200) * 128;
+    return std::uint16_t(std::clamp(up ? std::ceil(x) : std::round(x), 1.0, 65535.0));
+}
+double from_error_code(std::uint16_t code) { return code ? std::exp2(code / 128.0 - 200) : 0; }
+
+// Values on 65536 levels between the smallest and the largest, exact for integers of 16 bits; rounded outward.
+struct RangeScale {
+    double lo = 0, step = 1;
+    std::uint16_t below(double v) const {
+        auto code = std::int64_t(std::clamp(std::floor((v - lo) / step), 0.0, 65535.0));
+        while (code > 0 && value(code) > v) --code;
+        return std::uint16_t(code);
+    }
+    std::uint16_t above(double v) const {
+        auto code = std::int64_t(std::clamp(std::ceil((v - lo) / step), 0.0, 65535.0));
+        while (code < 65535 && value(code) < v) ++code;
+        return std::uint16_t(code);
+    }
+    double value(std::int64_t code) const { return lo + double(code) * step; }
+};
+
+RangeScale scale_of(const TreeIndex& index) {
+    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
+    for (const auto& level : index.infos)
+        for (const BrickInfo& info : level) {
+            lo = std::min(lo, info.range.min);
+            hi = std::max(hi, info.range.max);
+        }
+    if (!(lo <= hi)) return {};
+    RangeScale scale{lo, 1};
+    if (is_float(index.tree.bricks.volume.type) || hi - lo > 65535) {
+        scale.step = hi / 65535 - lo / 65535;
+        while (scale.value(65535) < hi) scale.step = std::nextafter(scale.step, std::numeric_limits<double>::infinity());
+    }
+    if (!(scale.step > 0)) scale.step = 1;
+    return scale;
+}
+
+void write_statistics(const TreeIndex& index, ByteWriter& writer) {
+    const RangeScale scale = scale_of(index);
+    writer.number(scale.lo);
+    writer.number(scale.step);
+    for (std::size_t l = 0; l < index.infos.size(); ++l) {
+        const auto& infos = index.infos[l];
+        std::vector<std::uint16_t> column(infos.size());
+        auto write = [&](auto&& code) {
+            std::transform(infos.begin(), infos.end(), column.begin(), code);
+            encode_column(column, writer);
+        };
+        write([&](const BrickInfo& i) { return scale.below(i.range.min); });
+        write([&](const BrickInfo& i) { return std::uint16_t(scale.above(i.range.max) - scale.below(i.range.min)); });
+        write([](const BrickInfo& i) { return error_code(i.l2, false); });
+        write([](const BrickInfo& i) { return error_code(i.max_error, true); });
+        for (std::size_t o = 0; o < 8 && l > 0; ++o)
+            write([o](const BrickInfo& i) { return std::uint16_t(i.l2 > 0 ? std::lround(255 * i.octant_l2[o] / i.l2) : 0); });
+    }
+}
+
+void read_statistics(TreeIndex& index, ByteReader& reader) {
+    RangeScale scale;
+    scale.lo = reader.number<double>();
+    scale.step = reader.number<double>();
+    for (std::size_t l = 0; l < index.infos.size(); ++l) {
+        auto& infos = index.infos[l];
+        auto read = [&](auto&& use) {
+            const auto column = decode_column(infos.size(), reader);
+            for (std::size_t i = 0; i < infos.size(); ++i) use(infos[i], column[i]);
+        };
+        std::vector<std::uint16_t> low(infos.size());
+        read([&](BrickInfo& i, std::uint16_t v) { low[std::size_t(&i - infos.data())] = v; i.range.min = scale.value(v); });
+        read([&](BrickInfo& i, std::uint16_t v) {
+            i.range.max = scale.value(std::int64_t(low[std::size_t(&i - infos.data())]) + v);
+        });
+        read([](BrickInfo& i, std::uint16_t v) { i.l2 = from_error_code(v); });
+        read([](BrickInfo& i, std::uint16_t v) { i.max_error = from_error_code(v); });
+        for (std::size_t o = 0; o < 8 && l > 0; ++o)
+            read([o](BrickInfo& i, std::uint16_t v) { i.octant_l2[o] = i.l2 * v / 255; });
+        for (BrickInfo& i : infos) {
+            if (l == 0) i.octant_l2[0] = i.l2;
+            i.exact_error = true;
+        }
+    }
+}
+
+// --- head --------------------------------------------------------------------------------------------
+
+void write_tree(const TreeIndex& index, ByteWriter& w) {
+    const TreeDesc& tree = index.tree;
+    const VolumeDesc& v = tree.bricks.volume;
+    for (int a = 0; a < 3; ++a) w.number(v.dims[a]);
+    for (int c = 0; c < 4; ++c)
+        for (int r = 0; r < 4; ++r) w.number(v.index_to_world[c][r]);
+    w.text(v.unit);
+    w.text(v.name);
+    w.number(std::uint8_t(v.type));
+    w.number(std::uint8_t(v.components));
+    w.number(std::uint8_t(v.color));
+    w.number(std::uint8_t(v.significant_bits));
+    w.number(v.range ? v.range->min : 0.0);
+    w.number(v.range ? v.range->max : 0.0);
+    w.number(std::uint8_t(tree.bricks.brick.x));
+    w.number(std::uint8_t(tree.bricks.levels.size()));
+    for (const LevelDesc& level : tree.bricks.levels)
+        for (int a = 0; a < 3; ++a) w.number(std::uint8_t(std::bit_width(unsigned(level.stride[a])) - 1));
+    w.number(std::uint8_t(tree.rounding));
+    w.number(std::uint8_t(tree.coder));
+    w.number(std::uint8_t(tree.distances));
+    w.number(tree.map.step);
+    w.number(tree.map.offset);
+    w.number(tree.quantiser.step);
+    w.number(tree.quantiser.threshold);
+    w.number(tree.quantiser.centre_one);
+    w.number(tree.quantiser.centre_more);
+    w.text(tree.provenance);
+}
+
+TreeDesc read_tree(ByteReader& r) {
+    TreeDesc tree;
+    VolumeDesc& v = tree.bricks.volume;
+    for (int a = 0; a < 3; ++a) v.dims[a] = r.number<std::int64_t>();
+    for (int c = 0; c < 4; ++c)
+        for (int row = 0; row < 4; ++row) v.index_to_world[c][row] = r.number<double>();
+    v.unit = r.text();
+    v.name = r.text();
+    const auto type = r.number<std::uint8_t>();
+    v.components = r.number<std::uint8_t>();
+    v.color = r.number<std::uint8_t>() != 0;
+    v.significant_bits = r.number<std::uint8_t>();
+    const auto lo = r.number<double>(), hi = r.number<double>();
+    v.range = ValueRange{lo, hi};
+    tree.bricks.brick = glm::ivec3(r.number<std::uint8_t>());
+    const auto levels = r.number<std::uint8_t>();
+    if (type >= kScalarTypes || v.components < 1 || v.components > 4 || v.significant_bits > 64) fail("its voxel type is not one");
+    v.type = ScalarType(type);
+    if (glm::any(glm::lessThan(v.dims, Index3(0)))) fail("its size is negative");
+    (void)v.dense_bytes();
+    if (!(lo <= hi) || !std::isfinite(lo) || !std::isfinite(hi)) fail("its value range is not one");
+    const int brick = tree.bricks.brick.x;
+    if (brick < 4 || brick > 64 || !std::has_single_bit(unsigned(brick))) fail("its bricks are not 4 to 64 voxels a side");
+
+    tree.bricks.tree_type = tree_type_of(v.type);
+    Index3 dims = v.dims;
+    glm::ivec3 exponent(0);
+    for (int l = 0; l < levels; ++l) {
+        LevelDesc level;
+        for (int a = 0; a < 3; ++a) {
+            const int e = r.number<std::uint8_t>();
+            if (e > 30 || e < exponent[a] || e > exponent[a] + (l > 0)) fail("its levels are not a pyramid");
+            if (e > exponent[a]) dims[a] = (dims[a] + 1) / 2;
+            exponent[a] = e;
+            level.stride[a] = 1 << e;
+            const std::int64_t n = (dims[a] + brick - 1) / brick;
+            if (n > std::int64_t(1) << 30) fail("its grid of bricks is too large");
+            level.bricks[a] = std::int32_t(n);
+        }
+        level.dims = dims;
+        if (l > 0 && level.stride == tree.bricks.levels.back().stride) fail("its levels are not a pyramid");
+        tree.bricks.levels.push_back(level);
+    }
+    if (tree.bricks.levels.empty() || (v.voxels() > 0 && tree.bricks.levels.back().bricks != glm::ivec3(1)))
+        fail("its levels do not end in one brick");
+
+    const auto rounding = r.number<std::uint8_t>(), coder = r.number<std::uint8_t>();
+    tree.distances = r.number<std::uint8_t>() != 0;
+    tree.map.step = r.number<double>();
+    tree.map.offset = r.number<double>();
+    tree.quantiser.step = r.number<double>();
+    tree.quantiser.threshold = r.number<double>();
+    tree.quantiser.centre_one = r.number<double>();
+    tree.quantiser.centre_more = r.number<double>();
+    tree.provenance = r.text();
+    if (rounding > 1 || coder >= kCoderKinds) fail("its coder or rounding is not known to this version");
+    tree.rounding = Rounding(rounding);
+    tree.coder = CoderKind(coder);
+    const Quantiser& q = tree.quantiser;
+    for (const double x : {tree.map.step, tree.map.offset, q.step, q.threshold, q.centre_one, q.centre_more})
+        if (!std::isfinite(x)) fail("its quantiser is not finite");
+    if (!(tree.map.step > 0) || q.step < 0 || q.threshold < 0 || std::abs(q.centre_one) > 1 || std::abs(q.centre_more) > 1)
+        fail("its quantiser is out of range");
+    return tree;
+}
+
+std::uint64_t grid_count(glm::ivec3 grid) { return checked_product(Index3(grid), 1, "a grid of bricks"); }
+
+TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload) {
+    ByteReader r(head);
+    TreeIndex index;
+    index.tree = read_tree(r);
+    TreeDesc& tree = index.tree;
+    index.coder = make_coder(tree.coder, r.block());
+    index.families.resize(tree.bricks.levels.size());
+    index.infos.resize(tree.bricks.levels.size());
+    if (tree.empty()) return index;
+    std::uint64_t offset = 0;
+    for (int l = tree.top(); l >= 0; --l) {
+        const std::uint64_t count = grid_count(families_of(tree, l));
+        if (count > r.left() / 5) fail("its index is too short for its size");
+        auto& families = index.families[std::size_t(l)];
+        families.resize(std::size_t(count));
+        for (FamilyPlace& place : families) {
+            place.offset = offset;
+            place.size = r.varint();
+            place.check = r.number<std::uint32_t>();
+            if (place.size > payload - offset) fail("its index points beyond its end");
+            offset += place.size;
+        }
+        index.infos[std::size_t(l)].resize(std::size_t(grid_count(tree.bricks.levels[std::size_t(l)].bricks)));
+        for (std::size_t i = 0; i < families.size(); ++i) {
+            const glm::i64vec3 n(families_of(tree, l));
+            const glm::ivec3 at(std::int64_t(i) % n.x, std::int64_t(i) / n.x % n.y, std::int64_t(i) / (n.x * n.y));
+            const auto bricks = l == tree.top() ? std::vector<BrickId>{{l, at}} : tree.bricks.finer({l + 1, at});
+            const glm::i64vec3 grid(tree.bricks.levels[std::size_t(l)].bricks);
+            for (std::size_t b = 0; b < bricks.size(); ++b) {
+                const glm::i64vec3 place(bricks[b].index);
+                index.infos[std::size_t(l)][std::size_t((place.z * grid.y + place.y) * grid.x + place.x)].compressed_bytes =
+                    families[i].size / bricks.size() + (b < families[i].size % bricks.size());
+            }
+        }
+    }
+    if (offset != payload) fail("its index does not cover its data");
+    read_statistics(index, r);
+    if (r.left() > 0) fail("its head is longer than it should be");
+    return index;
+}
+
+}  // namespace
+
+Bytes head_of(const TreeIndex& index, std::uint64_t payload) {
+    Bytes head;
+    ByteWriter w(head);
+    write_tree(index, w);
+    w.block(index.coder->tables());
+    if (!index.tree.empty()) {
+        for (int l = index.tree.top(); l >= 0; --l)
+            for (const FamilyPlace& place : index.families[std::size_t(l)]) {
+                w.varint(place.size);
+                w.number(place.check);
+            }
+        write_statistics(index, w);
+    }
+    Bytes all;
+    ByteWriter file(all);
+    file.bytes(std::as_bytes(std::span(kMagic)));
+    file.number(kFileVersion);
+    file.number(kEndian);
+    file.number(std::uint64_t(head.size()));
+    file.number(payload);
+    Hasher hasher;
+    hasher.bytes(all);
+    hasher.bytes(head);
+    file.number(hasher.finish().lo);
+    file.bytes(head);
+    return all;
+}
+
+std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload) { return head_of(index, payload).size() + payload; }
+
+std::uint64_t index_memory(const TreeIndex& index) {
+    std::uint64_t bytes = 0;
+    for (const auto& level : index.families) bytes += level.size() * sizeof(FamilyPlace);
+    for (const auto& level : index.infos) bytes += level.size() * sizeof(BrickInfo);
+    return bytes;
+}
+
+void write_file(const WaveletBricks& bricks, const std::filesystem::path& path, const std::stop_token& stop) {
+    OutputFile file(path);
+    file.write(head_of(bricks.index(), bricks.payload().size()));
+    for (auto rest = bricks.payload(); !rest.empty();) {
+        check_stop(stop);
+        const auto part = rest.first(std::min<std::size_t>(rest.size(), 8 << 20));
+        file.write(part);
+        rest = rest.subspan(part.size());
+    }
+    file.commit();
+}
+
+std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes, std::shared_ptr<const void> keeper,
+                                                const std::string& name) {
+    try {
+        if (bytes.size() < kPreamble || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
+            fail("it does not begin like one");
+        ByteReader r(bytes.subspan(sizeof kMagic));
+        const auto version = r.number<std::uint32_t>(), endian = r.number<std::uint32_t>();
+        if (endian != kEndian) fail("its byte order is not this machine's");
+        if (version != kFileVersion) fail("it has version {}, and version {} is known", version, kFileVersion);
+        const auto head_size = r.number<std::uint64_t>(), payload = r.number<std::uint64_t>(), hash = r.number<std::uint64_t>();
+        if (head_size > r.left() || payload != r.left() - head_size)
+            fail("it should have {} bytes of head and {} of data, and has {} of both", head_size, payload, r.left());
+        const auto head = r.bytes(head_size);
+        Hasher hasher;
+        hasher.bytes(bytes.first(kPreamble - 8));
+        hasher.bytes(head);
+        if (hasher.finish().lo != hash) fail("its head's checksum is wrong");
+        TreeIndex index = read_head(head, payload);
+        index.tree.bricks.compressed_bytes = bytes.size();
+        const std::uint64_t resident = index_memory(index);
+        return std::make_shared<WaveletBricks>(std::move(index), r.bytes(payload), std::move(keeper), resident);
+    } catch (const Error& e) {
+        fail("{} is not a wavelet file that can be read: {}; get the file again", name, e.what());
+    }
+}
+
+std::shared_ptr<const WaveletBricks> open_file(const std::filesystem::path& path) {
+    struct Mapped {
+        void* data = MAP_FAILED;
+        std::size_t size = 0;
+        int descriptor = -1;
+        ~Mapped() {
+            if (data != MAP_FAILED) ::munmap(data, size);
+            if (descriptor >= 0) ::close(descriptor);
+        }
+    };
+    auto file = std::make_shared<Mapped>();
+    file->descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    struct stat status {};
+    if (file->descriptor < 0 || ::fstat(file->descriptor, &status) != 0)
+        fail("{}: cannot be opened ({})", path.string(), std::strerror(errno));
+    if (!S_ISREG(status.st_mode)) fail("{}: is not a file", path.string());
+    file->size = std::size_t(status.st_size);
+    if (file->size > 0) file->data = ::mmap(nullptr, file->size, PROT_READ, MAP_PRIVATE, file->descriptor, 0);
+    if (file->size > 0 && file->data == MAP_FAILED) fail("{}: cannot be mapped ({})", path.string(), std::strerror(errno));
+    const std::span bytes(static_cast<const std::byte*>(file->data), file->size);
+    return open_bytes(bytes, file, path.string());
+}
+
+}  // namespace voxloom::wavelet

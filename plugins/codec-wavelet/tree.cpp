@@ -1,0 +1,215 @@
+#include "plugins/codec-wavelet/tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/data/convert.h"
+#include "plugins/codec-wavelet/byte_io.h"
+
+namespace voxloom::wavelet {
+
+ScalarType tree_type_of(ScalarType type) {
+    switch (type) {
+        case ScalarType::u8:
+        case ScalarType::i8: return ScalarType::i16;
+        case ScalarType::u16:
+        case ScalarType::i16: return ScalarType::i32;
+        case ScalarType::u32:
+        case ScalarType::i32: return ScalarType::f64;
+        default: return type;
+    }
+}
+
+namespace {
+
+glm::bvec3 halved_below(const TreeDesc& tree, int level) {
+    if (level >= tree.top()) return glm::bvec3(false);
+    const auto& levels = tree.bricks.levels;
+    return glm::notEqual(levels[std::size_t(level)].stride, levels[std::size_t(level) + 1].stride);
+}
+
+// The low band of a transformed box, and back into one.
+void take_low(const std::int32_t* box, const Shape& shape, std::int32_t* low) {
+    const glm::ivec3 n = shape.low();
+    for (int z = 0; z < n.z; ++z)
+        for (int y = 0; y < n.y; ++y, low += n.x) std::copy_n(box + shape.at({0, y, z}), n.x, low);
+}
+void put_low(const std::int32_t* low, const Shape& shape, std::int32_t* box) {
+    const glm::ivec3 n = shape.low();
+    for (int z = 0; z < n.z; ++z)
+        for (int y = 0; y < n.y; ++y, low += n.x) std::copy_n(low, n.x, box + shape.at({0, y, z}));
+}
+
+template <class Row>
+void for_each_band_row(const Details& d, const Row& row) {
+    for (int mask : kBandOrder) {
+        const Band b = d.shape.band(mask);
+        if (!d.shape.has(b)) continue;
+        for (int z = 0; z < b.dims.z; ++z)
+            for (int y = 0; y < b.dims.y; ++y)
+                row(mask, d.q + d.shape.at(b.lo + glm::ivec3(0, y, z)), b.dims.x);
+    }
+}
+
+}  // namespace
+
+glm::ivec3 families_of(const TreeDesc& tree, int level) {
+    return tree.bricks.levels[std::size_t(std::min(level + 1, tree.top()))].bricks;
+}
+
+FamilyId family_of(const TreeDesc& tree, BrickId brick) {
+    if (const auto parent = tree.bricks.coarser(brick)) return {brick.level, parent->index};
+    return {brick.level, brick.index};
+}
+
+Box box_of(const TreeDesc& tree, FamilyId family) {
+    const Index3 size = Index3(tree.bricks.brick) * glm::mix(Index3(1), Index3(2), halved_below(tree, family.level));
+    const Index3 lo = Index3(family.index) * size;
+    return {lo, glm::min(lo + size, tree.bricks.levels[std::size_t(family.level)].dims)};
+}
+
+Shape shape_of(const TreeDesc& tree, FamilyId family) {
+    return {glm::ivec3(box_of(tree, family).dims()), halved_below(tree, family.level)};
+}
+
+Details FamilyCodec::details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const {
+    Details d;
+    d.shape = shape_of(tree_, family);
+    d.q = box;
+    d.low = low.data();
+    d.finest = family.level == 0;
+    set_steps(d, tree_.bricks.levels[std::size_t(family.level)].stride);
+    return d;
+}
+
+void FamilyCodec::set_steps(Details& d, glm::ivec3 fine_stride) const {
+    for (int mask : kBandOrder)
+        if (d.shape.has(d.shape.band(mask)) && tree_.quantiser.step > 0)
+            d.step[std::size_t(mask)] =
+                std::max(1.0, tree_.quantiser.step / band_norm(mask, fine_stride, d.shape.halved));
+}
+
+void FamilyCodec::quantise(Details& d) const {
+    if (tree_.quantiser.threshold > 0) {
+        const double threshold = tree_.quantiser.threshold;
+        for_each_band_row(d, [&](int, std::int32_t* q, int n) {
+            for (int x = 0; x < n; ++x)
+                if (std::abs(double(q[x])) < threshold) q[x] = 0;
+        });
+    }
+    for_each_band_row(d, [&](int mask, std::int32_t* q, int n) {
+        const double step = d.step[std::size_t(mask)];
+        if (step <= 1) return;
+        for (int x = 0; x < n; ++x) {
+            const double size = std::abs(double(q[x])) / step;
+            const auto number = size < kDeadZone ? 0 : std::max(1, std::int32_t(size + kRoundUp));
+            q[x] = q[x] < 0 ? -number : number;
+        }
+    });
+}
+
+void FamilyCodec::rebuild(Details& d) const {
+    const Quantiser& quantiser = tree_.quantiser;
+    for_each_band_row(d, [&](int mask, std::int32_t* q, int n) {
+        const double step = d.step[std::size_t(mask)];
+        if (step <= 1) return;
+        for (int x = 0; x < n; ++x) {
+            if (q[x] == 0) continue;
+            const double magnitude = std::abs(double(q[x]));
+            const double centre = magnitude == 1 ? quantiser.centre_one : quantiser.centre_more;
+            const double size = std::min((magnitude + centre) * step, 2147483647.0);
+            const auto value = std::int32_t(size + 0.5 > 2147483647.0 ? 2147483647.0 : size + 0.5);
+            q[x] = q[x] < 0 ? -value : value;
+        }
+    });
+    put_low(d.low, d.shape, d.q);
+}
+
+void FamilyCodec::encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out) const {
+    ByteWriter writer(out);
+    Bytes part;
+    if (family.level == tree_.top()) {
+        const LevelDesc& level = tree_.bricks.levels.back();
+        for (auto& plane : planes) encode_root(plane, glm::ivec3(level.dims), level.stride, out);
+        return;
+    }
+    restore(family, low, planes, [&](const Details& d) {
+        part.clear();
+        coder_.encode(d, part);
+        writer.block(part);
+    });
+}
+
+void FamilyCodec::decode(FamilyId family, const Planes& low, ByteReader& in, Planes& planes) const {
+    thread_local std::vector<std::int32_t> scratch;
+    for (std::size_t c = 0; c < planes.size(); ++c) {
+        if (family.level == tree_.top()) {
+            const LevelDesc& level = tree_.bricks.levels.back();
+            decode_root(planes[c], glm::ivec3(level.dims), level.stride, in);
+            continue;
+        }
+        Details d = details_of(family, low[c], planes[c].data());
+        coder_.decode(in.block(), d);
+        rebuild(d);
+        inverse(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+    }
+}
+
+void FamilyCodec::encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const {
+    ByteWriter writer(out);
+    if (dims == glm::ivec3(1)) return writer.number(plane[0]);
+    Details d;
+    d.shape = {dims, glm::greaterThan(dims, glm::ivec3(1))};
+    d.q = plane.data();
+    std::vector<std::int32_t> scratch;
+    forward(d.q, dims, d.shape.halved, tree_.rounding, scratch);
+    const glm::ivec3 n = d.shape.low();
+    std::vector<std::int32_t> low(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+    take_low(d.q, d.shape, low.data());
+    encode_root(low, n, stride * glm::mix(glm::ivec3(1), glm::ivec3(2), d.shape.halved), out);
+    d.low = low.data();
+    set_steps(d, stride);
+    quantise(d);
+    Bytes part;
+    coder_.encode(d, part);
+    writer.block(part);
+    rebuild(d);
+    inverse(d.q, dims, d.shape.halved, tree_.rounding, scratch);
+}
+
+void FamilyCodec::decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, ByteReader& in) const {
+    if (dims == glm::ivec3(1)) {
+        plane[0] = in.number<std::int32_t>();
+        return;
+    }
+    Details d;
+    d.shape = {dims, glm::greaterThan(dims, glm::ivec3(1))};
+    d.q = plane.data();
+    const glm::ivec3 n = d.shape.low();
+    std::vector<std::int32_t> scratch, low(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+    decode_root(low, n, stride * glm::mix(glm::ivec3(1), glm::ivec3(2), d.shape.halved), in);
+    d.low = low.data();
+    set_steps(d, stride);
+    coder_.decode(in.block(), d);
+    rebuild(d);
+    inverse(d.q, dims, d.shape.halved, tree_.rounding, scratch);
+}
+
+void FamilyCodec::to_voxels(const Planes& planes, std::size_t count, std::byte* out) const {
+    const VolumeDesc& volume = tree_.bricks.volume;
+    auto [lo, hi] = limits_of(volume.type);
+    if (volume.range) {
+        lo = std::max(lo, volume.range->min);
+        hi = std::min(hi, volume.range->max);
+    }
+    const std::size_t components = planes.size();
+    std::vector<double> values(count * components);
+    for (std::size_t c = 0; c < components; ++c)
+        for (std::size_t i = 0; i < count; ++i)
+            values[i * components + c] = std::clamp(tree_.map.value(planes[c][i]), lo, hi);
+    from_double(values.data(), values.size(), volume.type, out);
+}
+
+}  // namespace voxloom::wavelet

@@ -1,0 +1,118 @@
+// The tree of families: where each stands, how its bytes become voxels, and, for the encoder, back.
+//
+// The family (l, i) holds the bricks of level l whose parent is brick i of level l + 1. The root family
+// (top, 0) holds the one brick of the coarsest level; its low band is taken further apart down to a single
+// voxel, so that nothing is stored as it is.
+//
+// Bytes of a family: for each component the coder's bytes, length first; at level 0 then the distances and
+// the patches of exact_layer.h, the former with their length. A family without any is not stored.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/data/bricks.h"
+#include "plugins/codec-wavelet/coder.h"
+#include "plugins/codec-wavelet/value_map.h"
+
+namespace voxloom::wavelet {
+
+struct FamilyId {
+    int level = 0;        // of the children
+    glm::ivec3 index{0};  // of the parent
+};
+
+// How coefficients became numbers. step == 0 means that they are kept as they are.
+struct Quantiser {
+    double step = 0;          // on level 0, in units of the tree: each band's is step / band_norm()
+    double threshold = 0;     // the paper's: smaller coefficients are dropped, others kept whole
+    // Numbers of magnitude 1, and larger ones, stand for magnitude + centre steps.
+    double centre_one = 0, centre_more = 0;
+};
+
+struct TreeDesc {
+    BricksDesc bricks;
+    Rounding rounding = Rounding::unbiased;
+    CoderKind coder = CoderKind::dense;
+    ValueMap map;
+    bool distances = false;   // level 0 has exact distances: lossless though the map is not exact
+    Quantiser quantiser;
+    std::string provenance;
+
+    int top() const { return int(bricks.levels.size()) - 1; }
+    bool empty() const { return bricks.volume.voxels() == 0; }
+    // Does the tree hold integers that the voxels do not tell?
+    bool has_state() const { return !map.identity() || is_float(bricks.tree_type); }
+};
+
+// What decoded bricks hold: the coarse levels of integers overshoot their type.
+ScalarType tree_type_of(ScalarType type);
+
+glm::ivec3 families_of(const TreeDesc& tree, int level);      // grid
+FamilyId family_of(const TreeDesc& tree, BrickId brick);
+Box box_of(const TreeDesc& tree, FamilyId family);             // in its level
+Shape shape_of(const TreeDesc& tree, FamilyId family);         // not of the root
+
+class FamilyCodec {
+  public:
+    // `coder` must outlive the codec.
+    FamilyCodec(const TreeDesc& tree, const Coder& coder) : tree_(tree), coder_(coder) {}
+
+    // One plane of integers (shape.voxels(), x fastest) for each component.
+    using Planes = std::vector<std::vector<std::int32_t>>;
+
+    // --- encoder ---
+    // Transforms, quantises and restores: `planes` hold the samples of the family's box and become what the
+    // decoder will get. `low` are the decoded parent's, empty for the root. `use` sees each plane's
+    // details (not the root's).
+    template <class Use>
+    void restore(FamilyId family, const Planes& low, Planes& planes, const Use& use) const;
+    // The same, and appends the coder's bytes.
+    void encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out) const;
+
+    // --- decoder ---
+    // Bytes of the coder's part are taken off `in`.
+    void decode(FamilyId family, const Planes& low, class ByteReader& in, Planes& planes) const;
+
+    // Voxels of the volume's type, components interleaved, from the tree's integers; clamped to the
+    // volume's range, where it is known, and its type.
+    void to_voxels(const Planes& planes, std::size_t count, std::byte* out) const;
+
+  private:
+    Details details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const;
+    void set_steps(Details& d, glm::ivec3 fine_stride) const;
+    void quantise(Details& d) const;
+    void rebuild(Details& d) const;
+    void encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const;
+    void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, class ByteReader& in) const;
+
+    const TreeDesc& tree_;
+    const Coder& coder_;
+};
+
+// Where the quantiser rounds: |c| / step below `first` gives 0, and what is left up by `up`. A wide dead
+// zone costs little error, since small coefficients are many, and saves most of their bits.
+inline constexpr double kDeadZone = 0.75, kRoundUp = 0.3;
+inline constexpr double kCentreOne = (kDeadZone + 2 - kRoundUp) / 2 - 1 - 0.12;  // less the density's slope
+inline constexpr double kCentreMore = 0.5 - kRoundUp - 0.04;
+
+template <class Use>
+void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, const Use& use) const {
+    Bytes nothing;
+    for (std::size_t c = 0; c < planes.size(); ++c) {
+        if (family.level == tree_.top()) {
+            const LevelDesc& level = tree_.bricks.levels.back();
+            encode_root(planes[c], glm::ivec3(level.dims), level.stride, nothing);
+            continue;
+        }
+        thread_local std::vector<std::int32_t> scratch;
+        Details d = details_of(family, low[c], planes[c].data());
+        forward(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+        quantise(d);
+        use(d);
+        rebuild(d);
+        inverse(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+    }
+}
+
+}  // namespace voxloom::wavelet

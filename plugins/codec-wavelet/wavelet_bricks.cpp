@@ -1,0 +1,139 @@
+#include "plugins/codec-wavelet/wavelet_bricks.h"
+
+#include <cassert>
+
+#include "core/base/error.h"
+#include "core/base/hash.h"
+#include "core/data/convert.h"
+#include "plugins/codec-wavelet/byte_io.h"
+#include "plugins/codec-wavelet/exact_layer.h"
+
+namespace voxloom::wavelet {
+
+namespace {
+
+std::size_t place_in(glm::ivec3 grid, glm::ivec3 i) {
+    return (std::size_t(i.z) * std::size_t(grid.y) + std::size_t(i.y)) * std::size_t(grid.x) + std::size_t(i.x);
+}
+
+// The parent's integers, a plane for each component.
+FamilyCodec::Planes parent_planes(const TreeDesc& tree, const BrickVoxels& parent) {
+    const auto components = std::size_t(tree.bricks.volume.components);
+    const std::size_t count = Box::of(parent.stored).voxels();
+    FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
+    auto spread = [&](auto values) {
+        for (std::size_t c = 0; c < components; ++c)
+            for (std::size_t i = 0; i < count; ++i) planes[c][i] = std::int32_t(values[i * components + c]);
+    };
+    if (tree.has_state())
+        spread(parent.decoder_state.as<std::int32_t>());
+    else if (tree.bricks.tree_type == ScalarType::i16)
+        spread(parent.voxels.as<std::int16_t>());
+    else
+        spread(parent.voxels.as<std::int32_t>());
+    return planes;
+}
+
+template <class T>
+Buffer interleaved(const FamilyCodec::Planes& planes, std::size_t count) {
+    Buffer out(count * planes.size() * sizeof(T), "brick");
+    T* to = out.as<T>().data();
+    for (std::size_t c = 0; c < planes.size(); ++c)
+        for (std::size_t i = 0; i < count; ++i) to[i * planes.size() + c] = T(planes[c][i]);
+    return out;
+}
+
+// The family's voxels in tree_type.
+Buffer tree_voxels(const TreeDesc& tree, const FamilyCodec::Planes& planes, std::size_t count) {
+    if (!tree.has_state())
+        return tree.bricks.tree_type == ScalarType::i16 ? interleaved<std::int16_t>(planes, count)
+                                                        : interleaved<std::int32_t>(planes, count);
+    std::vector<double> values(count * planes.size());
+    for (std::size_t c = 0; c < planes.size(); ++c)
+        for (std::size_t i = 0; i < count; ++i) values[i * planes.size() + c] = tree.map.value(planes[c][i]);
+    Buffer out(values.size() * bytes_of(tree.bricks.tree_type), "brick");
+    from_double(values.data(), values.size(), tree.bricks.tree_type, out.data());
+    return out;
+}
+
+}  // namespace
+
+std::uint32_t check_of(std::span<const std::byte> bytes) { return std::uint32_t(hash_bytes(bytes).lo); }
+
+WaveletBricks::WaveletBricks(TreeIndex index, std::span<const std::byte> payload,
+                             std::shared_ptr<const void> keeper, std::uint64_t resident)
+    : Bricks(index.tree.bricks), index_(std::move(index)), payload_(payload), keeper_(std::move(keeper)),
+      resident_(resident) {}
+
+BrickInfo WaveletBricks::info(BrickId id) const {
+    assert(desc().has(id));
+    const auto level = std::size_t(id.level);
+    return index_.infos[level][place_in(desc().levels[level].bricks, id.index)];
+}
+
+std::uint64_t WaveletBricks::family_bytes(BrickId id) const {
+    const FamilyId family = family_of(index_.tree, id);
+    const std::uint64_t count = box_of(index_.tree, family).voxels() * std::uint64_t(desc().volume.components);
+    const bool state = index_.tree.has_state() && id.level > 0;
+    return count * (bytes_of(desc().tree_type) + (state ? sizeof(std::int32_t) : 0));
+}
+
+std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const {
+    check_stop(stop);
+    const TreeDesc& tree = index_.tree;
+    const VolumeDesc& volume = tree.bricks.volume;
+    const FamilyId family = family_of(tree, id);
+    const Box box = box_of(tree, family);
+    const std::size_t count = box.voxels(), components = std::size_t(volume.components);
+    const FamilyCodec codec(tree, *index_.coder);
+
+    FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
+    Buffer voxels;
+    try {
+        const FamilyPlace& place = index_.families[std::size_t(id.level)]
+                                                  [place_in(families_of(tree, id.level), family.index)];
+        const auto bytes = payload_.subspan(std::size_t(place.offset), std::size_t(place.size));
+        if (check_of(bytes) != place.check) fail("its checksum is wrong");
+        FamilyCodec::Planes low;
+        if (parent) low = parent_planes(tree, *parent);
+        // A family that is not stored reads as empty streams.
+        static const Bytes nothing(64);
+        ByteReader in(place.size ? bytes : std::span(nothing));
+        codec.decode(family, low, in, planes);
+        if (id.level == 0) {
+            Buffer fine(count * volume.voxel_bytes(), "brick");
+            codec.to_voxels(planes, count, fine.data());
+            if (place.size) {
+                decode_distances(volume.type, in.block(), fine.data(), count * components);
+                decode_patches(volume.type, in.bytes(in.left()), fine.data(), count * components);
+            }
+            voxels = Buffer(count * tree.bricks.tree_voxel_bytes(), "brick");
+            convert(volume.type, fine.data(), tree.bricks.tree_type, voxels.data(), count * components);
+        } else {
+            voxels = tree_voxels(tree, planes, count);
+        }
+    } catch (const Error& e) {
+        fail("the compressed data of brick {} {} {} of level {} is damaged ({}); get the file again", id.index.x,
+             id.index.y, id.index.z, id.level, e.what());
+    }
+
+    Buffer state;
+    if (tree.has_state() && id.level > 0) state = interleaved<std::int32_t>(planes, count);
+    std::vector<DecodedBrick> bricks;
+    for (const BrickId& child : parent ? desc().finer(*desc().coarser(id)) : std::vector<BrickId>{id}) {
+        auto brick = std::make_shared<BrickVoxels>();
+        const Box part = desc().box_of(child);
+        brick->stored = part.dims();
+        brick->voxels = Buffer(part.voxels() * desc().tree_voxel_bytes(), "brick");
+        copy_box(part, voxels.data(), box, brick->voxels.data(), part, desc().tree_voxel_bytes());
+        if (state.size() > 0) {
+            const std::size_t each = components * sizeof(std::int32_t);
+            brick->decoder_state = Buffer(part.voxels() * each, "brick");
+            copy_box(part, state.data(), box, brick->decoder_state.data(), part, each);
+        }
+        bricks.push_back({child, std::move(brick)});
+    }
+    return bricks;
+}
+
+}  // namespace voxloom::wavelet

@@ -1,0 +1,51 @@
+// A wavelet tree as Bricks: bytes in memory or in a mapped file, decoded when a family is asked for.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "plugins/codec-wavelet/tree.h"
+
+namespace voxloom::wavelet {
+
+// Bytes of one family in the payload. Size 0: nothing but interpolation of the parent.
+struct FamilyPlace {
+    std::uint64_t offset = 0;
+    std::uint64_t size = 0;
+    std::uint32_t check = 0;  // lower half of XXH3
+};
+
+// Everything of a tree but its payload.
+struct TreeIndex {
+    TreeDesc tree;
+    std::unique_ptr<Coder> coder;
+    std::vector<std::vector<FamilyPlace>> families;  // of each level, x fastest
+    std::vector<std::vector<BrickInfo>> infos;       // of each level's bricks, x fastest
+};
+
+std::uint32_t check_of(std::span<const std::byte> bytes);
+
+class WaveletBricks final : public Bricks {
+  public:
+    // `keeper` keeps the payload alive (a vector of bytes, a mapped file).
+    // `resident` is the memory that it takes.
+    WaveletBricks(TreeIndex index, std::span<const std::byte> payload, std::shared_ptr<const void> keeper,
+                  std::uint64_t resident);
+
+    BrickInfo info(BrickId id) const override;
+    std::optional<BrickId> parent(BrickId id) const override { return desc().coarser(id); }
+    std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const override;
+    std::uint64_t family_bytes(BrickId id) const override;
+    std::uint64_t resident_bytes() const override { return resident_; }
+
+    const TreeIndex& index() const { return index_; }
+    std::span<const std::byte> payload() const { return payload_; }
+
+  private:
+    TreeIndex index_;
+    std::span<const std::byte> payload_;
+    std::shared_ptr<const void> keeper_;
+    std::uint64_t resident_;
+};
+
+}  // namespace voxloom::wavelet
