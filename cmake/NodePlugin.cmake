@@ -78,8 +78,8 @@ function(voxloom_discover_tests target)
         "TSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/tsan.supp:allocator_may_return_null=1")
   elseif(VOXLOOM_SANITIZE MATCHES "address")
     set(sanitizer ENVIRONMENT_MODIFICATION
-        "ASAN_OPTIONS=set:allocator_may_return_null=1"
-        "LSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/lsan.supp:print_suppressions=0")
+        "ASAN_OPTIONS=set:allocator_may_return_null=1\\;\
+LSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/lsan.supp:print_suppressions=0")
   endif()
   gtest_discover_tests(${target} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
     DISCOVERY_TIMEOUT 60 TEST_PREFIX "${target}."

@@ -132,7 +132,8 @@ class Run {
     void finish(int node, NodeState state, std::string error, std::shared_ptr<const Result> result);
     void task_done();
     void release_inputs(int node);
-    void not_run(int node, const std::string& because);
+    void settle(int node, NodeState state, std::string error, std::shared_ptr<const Result> result);
+    std::string why_not_run(int source) const;
     void report_state(int node) {
         if (options_.observer) options_.observer->state_changed(node, reports_[std::size_t(node)]);
     }
@@ -365,6 +366,29 @@ void Run::execute(int node) {
 }
 
 void Run::finish(int node, NodeState state, std::string error, std::shared_ptr<const Result> result) {
+    settle(node, state, std::move(error), std::move(result));
+    // A list, not recursion: a failure at the head of a long chain settles all of it.
+    std::vector<int> settled{node};
+    while (!settled.empty()) {
+        const int source = settled.back();
+        settled.pop_back();
+        NodeRun& run = runs_[std::size_t(source)];
+        for (int consumer : run.consumers) {
+            NodeRun& next = runs_[std::size_t(consumer)];
+            if (next.finished) continue;
+            if (run.result) {
+                if (--next.waiting_for == 0) start(consumer);
+                continue;
+            }
+            settle(consumer, options_.stop.stop_requested() ? NodeState::cancelled : NodeState::not_run,
+                   why_not_run(source), nullptr);
+            settled.push_back(consumer);
+        }
+        if (run.consumers_left == 0 && !run.wanted) run.result.reset();
+    }
+}
+
+void Run::settle(int node, NodeState state, std::string error, std::shared_ptr<const Result> result) {
     NodeRun& run = runs_[std::size_t(node)];
     run.finished = true;
     run.result = std::move(result);
@@ -374,24 +398,13 @@ void Run::finish(int node, NodeState state, std::string error, std::shared_ptr<c
     --unfinished_;
     report_state(node);
     release_inputs(node);
-    const bool there = run.result != nullptr;
-    for (int consumer : run.consumers) {
-        NodeRun& next = runs_[std::size_t(consumer)];
-        if (next.finished) continue;
-        if (!there)
-            not_run(consumer, state == NodeState::cancelled
-                                  ? "the run was cancelled"
-                                  : "it needs '" + report.id + "', which " +
-                                        (state == NodeState::failed ? "failed" : "was not run"));
-        else if (--next.waiting_for == 0)
-            start(consumer);
-    }
-    if (run.consumers_left == 0 && !run.wanted) run.result.reset();
 }
 
-void Run::not_run(int node, const std::string& because) {
-    finish(node, options_.stop.stop_requested() ? NodeState::cancelled : NodeState::not_run, because,
-           nullptr);
+std::string Run::why_not_run(int source) const {
+    const NodeReport& report = reports_[std::size_t(source)];
+    if (report.state == NodeState::cancelled) return "the run was cancelled";
+    return "it needs '" + report.id + "', which " +
+           (report.state == NodeState::failed ? "failed" : "was not run");
 }
 
 // The outputs that this node used are freed as soon as nobody else needs them in this run.
