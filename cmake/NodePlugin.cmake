@@ -70,7 +70,7 @@ function(voxloom_discover_tests target)
   if(label STREQUAL "unit")
     add_dependencies(unit-tests ${target})
   endif()
-  # What is not ours, and why, stands in cmake/*.supp. Memory that is not there must come back as
+  # What is not ours, and why, stands in cmake/tsan.supp and tests/sanitizers/leaks.cpp. Memory that is not there must come back as
   # the error that tests ask for, as it does without a sanitizer.
   set(sanitizer)
   if(VOXLOOM_SANITIZE MATCHES "thread")
@@ -78,8 +78,7 @@ function(voxloom_discover_tests target)
         "TSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/tsan.supp:allocator_may_return_null=1")
   elseif(VOXLOOM_SANITIZE MATCHES "address")
     set(sanitizer ENVIRONMENT_MODIFICATION
-        "ASAN_OPTIONS=set:allocator_may_return_null=1\\;\
-LSAN_OPTIONS=set:suppressions=${PROJECT_SOURCE_DIR}/cmake/lsan.supp:print_suppressions=0")
+        "ASAN_OPTIONS=set:allocator_may_return_null=1")
   endif()
   gtest_discover_tests(${target} WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
     DISCOVERY_TIMEOUT 60 TEST_PREFIX "${target}."
