@@ -144,7 +144,7 @@ class Pass {
         done_ = 0;
         for (int mask : kBandOrder) {
             const Band band = d_.shape.band(mask);
-            if (!d_.shape.has(band) || (mask & ~halved_mask())) continue;
+            if (!d_.shape.has(band)) continue;
             space_.size[std::size_t(mask)].reset(low);
             blocks_ = (low + kBlock - 1) / kBlock;
             space_.block_used[std::size_t(mask)].assign(
@@ -155,10 +155,10 @@ class Pass {
     }
 
   private:
-    int halved_mask() const { return d_.shape.halved.x | d_.shape.halved.y << 1 | d_.shape.halved.z << 2; }
+    // The parent's sample at a place of a band: along split axes the band has but half of them.
     std::size_t place(int x, int y, int z) const {
-        const glm::ivec3 low = d_.shape.low();
-        return (std::size_t(z) * std::size_t(low.y) + std::size_t(y)) * std::size_t(low.x) + std::size_t(x);
+        const glm::ivec3 low = d_.shape.low(), i = glm::ivec3(x, y, z) << glm::ivec3(d_.shape.split);
+        return (std::size_t(i.z) * std::size_t(low.y) + std::size_t(i.y)) * std::size_t(low.x) + std::size_t(i.x);
     }
     std::int32_t& number(const Band& b, int x, int y, int z) const { return d_.q[d_.shape.at(b.lo + glm::ivec3(x, y, z))]; }
 
@@ -199,7 +199,7 @@ class Pass {
         // 8 levels a step; the band's numbers are -1/16 of the curvature along each of its axes.
         const std::int64_t scale = std::int64_t(65536.0 * 8 / std::max(1.0, d_.step[std::size_t(b.mask)]));
         for (int a = 0; a < 3; ++a) {
-            if (!(b.mask >> a & 1)) continue;
+            if (!(b.mask >> a & 1) || !d_.shape.halved[a]) continue;
             const auto& curvature = space_.curvature[std::size_t(a)];
             const auto& slope = space_.slope[std::size_t(a)];
             constexpr std::int64_t most = 1 << 24;

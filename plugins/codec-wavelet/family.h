@@ -17,9 +17,13 @@ struct Band {
     glm::ivec3 lo{0}, dims{0};  // where it stands in the family's box
 };
 
+// Axes that are not halved keep all samples in the low band. In the details they are correlated all the
+// same, so there they are split once more: such a band's mask has the bit of a split axis beside
+// that of a halved one.
 struct Shape {
     glm::ivec3 dims{1};    // voxels of the children together
     glm::bvec3 halved{false};
+    glm::bvec3 split{false};
 
     glm::ivec3 low() const { return low_dims(dims, halved); }
     std::size_t voxels() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
@@ -27,16 +31,17 @@ struct Shape {
         return (std::size_t(i.z) * std::size_t(dims.y) + std::size_t(i.y)) * std::size_t(dims.x) + std::size_t(i.x);
     }
     Band band(int mask) const {
-        Band b{mask, glm::ivec3(0), low()};
+        Band b{mask, glm::ivec3(0), mask ? low_dims(dims, glm::bvec3(glm::ivec3(halved) | glm::ivec3(split))) : low()};
         for (int a = 0; a < 3; ++a)
             if (mask >> a & 1) {
                 b.lo[a] = b.dims[a];
-                b.dims[a] = dims[a] - b.dims[a];
+                b.dims[a] = halved[a] || split[a] ? dims[a] - b.dims[a] : 0;
             }
+        if (mask && !(mask & bits(halved))) b.dims = glm::ivec3(0);
         return b;
     }
     bool has(const Band& b) const { return b.dims.x > 0 && b.dims.y > 0 && b.dims.z > 0; }
-    friend bool operator==(const Shape& a, const Shape& b) { return a.dims == b.dims && a.halved == b.halved; }
+    static int bits(glm::bvec3 axes) { return axes.x | axes.y << 1 | axes.z << 2; }
 };
 
 // The order in which bands are coded: those with one high axis first, since the others lean on them.
@@ -47,8 +52,13 @@ inline constexpr std::array<int, 7> kBandOrder = {1, 2, 4, 3, 5, 6, 7};
 double scaling_norm(int j);
 double wavelet_norm(int j);
 
-// Norm of a coefficient of a band on level 0. fine_stride is the children's: 2^(times halved).
-double band_norm(int mask, glm::ivec3 fine_stride, glm::bvec3 halved);
+// Norm of a coefficient of a band on level 0. fine_stride is the children's: 2^(times halved); `axes` are
+// those halved or split.
+double band_norm(int mask, glm::ivec3 fine_stride, glm::bvec3 axes);
+
+// The transform of lifting.h, and of the details along the split axes.
+void split_family(std::int32_t* box, const Shape& shape, Rounding rounding, std::vector<std::int32_t>& scratch);
+void join_family(std::int32_t* box, const Shape& shape, Rounding rounding, std::vector<std::int32_t>& scratch);
 
 // The quantised details of one component of a family: what an entropy coder turns into bytes.
 struct Details {

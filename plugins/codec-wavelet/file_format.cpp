@@ -162,6 +162,7 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
         for (int a = 0; a < 3; ++a) w.number(std::uint8_t(std::bit_width(unsigned(level.stride[a])) - 1));
     w.number(std::uint8_t(tree.rounding));
     w.number(std::uint8_t(tree.coder));
+    w.number(std::uint8_t(tree.split));
     w.number(std::uint8_t(tree.distances));
     w.number(tree.map.step);
     w.number(tree.map.offset);
@@ -219,6 +220,7 @@ TreeDesc read_tree(ByteReader& r) {
         fail("its levels do not end in one brick");
 
     const auto rounding = r.number<std::uint8_t>(), coder = r.number<std::uint8_t>();
+    tree.split = r.number<std::uint8_t>() != 0;
     tree.distances = r.number<std::uint8_t>() != 0;
     tree.map.step = r.number<double>();
     tree.map.offset = r.number<double>();

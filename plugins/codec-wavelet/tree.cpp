@@ -71,7 +71,9 @@ Box box_of(const TreeDesc& tree, FamilyId family) {
 }
 
 Shape shape_of(const TreeDesc& tree, FamilyId family) {
-    return {glm::ivec3(box_of(tree, family).dims()), halved_below(tree, family.level)};
+    Shape shape{glm::ivec3(box_of(tree, family).dims()), halved_below(tree, family.level)};
+    if (tree.split) shape.split = glm::not_(shape.halved);
+    return shape;
 }
 
 Details FamilyCodec::details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const {
@@ -88,7 +90,7 @@ void FamilyCodec::set_steps(Details& d, glm::ivec3 fine_stride) const {
     for (int mask : kBandOrder)
         if (d.shape.has(d.shape.band(mask)) && tree_.quantiser.step > 0)
             d.step[std::size_t(mask)] =
-                std::max(1.0, tree_.quantiser.step / band_norm(mask, fine_stride, d.shape.halved));
+                std::max(1.0, tree_.quantiser.step / band_norm(mask, fine_stride, glm::bvec3(glm::ivec3(d.shape.halved) | glm::ivec3(d.shape.split))));
 }
 
 void FamilyCodec::quantise(Details& d) const {
@@ -153,7 +155,7 @@ void FamilyCodec::decode(FamilyId family, const Planes& low, ByteReader& in, Pla
         Details d = details_of(family, low[c], planes[c].data());
         coder_.decode(in.block(), d);
         rebuild(d);
-        inverse(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+        join_family(d.q, d.shape, tree_.rounding, scratch);
     }
 }
 

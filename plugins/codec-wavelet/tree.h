@@ -35,6 +35,7 @@ struct TreeDesc {
     Rounding rounding = Rounding::unbiased;
     CoderKind coder = CoderKind::dense;
     ValueMap map;
+    bool split = true;        // details are split along axes that are not halved
     bool distances = false;   // level 0 has exact distances: lossless though the map is not exact
     Quantiser quantiser;
     std::string provenance;
@@ -107,11 +108,11 @@ void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, co
         }
         thread_local std::vector<std::int32_t> scratch;
         Details d = details_of(family, low[c], planes[c].data());
-        forward(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+        split_family(d.q, d.shape, tree_.rounding, scratch);
         quantise(d);
         use(d);
         rebuild(d);
-        inverse(d.q, d.shape.dims, d.shape.halved, tree_.rounding, scratch);
+        join_family(d.q, d.shape, tree_.rounding, scratch);
     }
 }
 
