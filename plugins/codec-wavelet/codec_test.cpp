@@ -71,7 +71,7 @@ VolumePtr scene_volume(Index3 dims, ScalarType type) {
 }
 
 class EveryCoder : public ::testing::TestWithParam<CoderKind> {};
-INSTANTIATE_TEST_SUITE_P(Coders, EveryCoder, ::testing::Values(CoderKind::paper, CoderKind::dense),
+INSTANTIATE_TEST_SUITE_P(Coders, EveryCoder, ::testing::Values(CoderKind::paper, CoderKind::dense, CoderKind::fast),
                          [](const auto& test) { return std::string(name_of(test.param)); });
 
 TEST_P(EveryCoder, LosslessGivesEveryBitBackForEveryTypeAndOddSizes) {
@@ -355,7 +355,7 @@ TEST_F(WaveletFile, ComesBackAsItWasWritten) {
 
 TEST_F(WaveletFile, EveryFlippedBitAndEveryTruncationIsFoundOrHarmless) {
     const VolumePtr volume = scene_volume({17, 9, 12}, ScalarType::u8);
-    for (CoderKind coder : {CoderKind::paper, CoderKind::dense}) {
+    for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::fast}) {
         const auto made = encoded(*volume, aiming(Target::psnr, 30, coder));
         write_file(*made, path());
         const Bytes file = bytes_of_file(path());

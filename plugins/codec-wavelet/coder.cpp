@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "plugins/codec-wavelet/dense_coder.h"
+#include "plugins/codec-wavelet/fast_coder.h"
 #include "plugins/codec-wavelet/paper_coder.h"
 
 namespace voxloom::wavelet {
@@ -14,7 +15,12 @@ std::string_view name_of(CoderKind kind) {
 }
 
 std::unique_ptr<Coder> make_coder(CoderKind kind, std::span<const std::byte> tables) {
-    return kind == CoderKind::paper ? make_paper_coder() : make_dense_coder(tables);
+    switch (kind) {
+        case CoderKind::paper: return make_paper_coder();
+        case CoderKind::fast: return make_fast_coder(tables);
+        case CoderKind::dense: break;
+    }
+    return make_dense_coder(tables);
 }
 
 namespace {

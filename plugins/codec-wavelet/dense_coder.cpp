@@ -20,27 +20,16 @@
 
 #include "core/base/error.h"
 #include "plugins/codec-wavelet/range_coder.h"
+#include "plugins/codec-wavelet/token.h"
 
 namespace voxloom::wavelet {
 
 namespace {
 
-constexpr int kMaxToken = 4 + 2 * 28 + 1;  // numbers below 2^31
 constexpr int kSteps = 24;                 // decisions of the unary part that have contexts of their own
 constexpr int kInputs = 6;
 constexpr int kBlock = 4;
 
-// 0, 1, 2, 3, 4-5, 6-7, 8-11, 12-15, ...
-int token_of(std::uint32_t m) {
-    if (m < 4) return int(m);
-    const int n = std::bit_width(m) - 1;
-    return 4 + 2 * (n - 2) + int(m >> (n - 1) & 1);
-}
-int low_bits_of(int token) { return token < 4 ? 0 : (token - 4) / 2 + 1; }
-std::uint32_t first_of(int token) {
-    if (token < 4) return std::uint32_t(token);
-    return std::uint32_t(2 | (token & 1)) << low_bits_of(token);
-}
 // token_of() for a context: no more than `levels` classes.
 int level_of(std::uint32_t m, int levels) { return std::min(token_of(m), levels - 1); }
 

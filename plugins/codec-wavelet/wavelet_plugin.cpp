@@ -10,7 +10,7 @@ namespace voxloom::wavelet {
 namespace {
 
 const std::vector<std::string> kTargets = {"lossless", "threshold", "psnr", "max-error", "bpv", "ratio"};
-const std::vector<std::string> kCoders = {"paper", "dense"};
+const std::vector<std::string> kCoders = {"paper", "dense", "fast"};
 const std::vector<std::string> kRoundings = {"jpeg2000", "unbiased"};
 
 // Choices stand in the order of the enumerations.
@@ -49,7 +49,7 @@ std::vector<ParamSpec> encoding_params() {
             .range(1e-6, 256).slider(0.05, 8, Scale::logarithmic).in_unit("bits").shown_if("target", {"bpv"}).is_quality(),
         param::real("ratio", 20, "Bytes of the original over bytes of the result.")
             .range(1, 1e6).slider(2, 200, Scale::logarithmic).shown_if("target", {"ratio"}).is_quality(),
-        param::choice("coder", kCoders, "dense", "The entropy coder: the paper's run lengths and fixed code, or adaptive contexts."),
+        param::choice("coder", kCoders, "dense", "The entropy coder: the paper's run lengths and fixed code, adaptive contexts, or static tables over blocks."),
         param::choice("brick", {"8", "16", "32"}, "16",
                       "Voxels of a brick along each axis: larger ones compress better, smaller ones are fetched faster.")
             .in_group("Tree"),
@@ -112,7 +112,7 @@ zone; a search finds the step. `psnr` is met to 0.1 dB, `bpv` and `ratio` are bu
 dropped, the others kept whole. Where losing nothing is no dearer, nothing is lost.
 
 `dense` codes with mixed adaptive contexts that start from a state learned once for the file; `paper` is the run-length and
-fixed Huffman code of the paper, several times larger on noisy data and many times faster.
+fixed Huffman code of the paper, `fast` static interleaved rANS over blocks of 4^3.
 
 Floats pass through a 24-bit map of their range; `lossless` adds the exact distance of every voxel. NaN and infinities are kept
 in every mode; coarse levels show the last value before them.
