@@ -8,12 +8,15 @@
 // its knobs. What is written:
 //
 //     OUT/NODE.PORT.npy   a volume's voxels [z, y, x(, component)], a picture [y, x, rgba] float32
-//     standard output     {"values": {"NODE.PORT": ...}, "times": {"NODE": {"wall": [s...], "draw":
-//     [s...]}}}
+//     standard output     {"values": {"NODE.PORT": ...}, "times": {"NODE": {"wall": [s...],
+//     "draw": [s...], "cpu": [s...]}}}
+//
+// "cpu" is the processor time of all threads: on a machine that others use too, it is the steadier one.
 #include <fmt/core.h>
 
 #include <bit>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -153,14 +156,16 @@ json times_of(const Plan& plan, const std::string& id, ResultCache& cache, const
     only.output_folder = options.out;
     only.wanted = {{node, 0}};
     only.again = {node};
-    json wall = json::array(), draw = json::array();
+    json wall = json::array(), draw = json::array(), cpu = json::array();
     for (int k = -options.warm_up; k < options.repeat; ++k) {
+        const std::clock_t start = std::clock();
         const RunResult result = run(plan, cache, only);
         if (k < 0) continue;
+        cpu.push_back(double(std::clock() - start) / CLOCKS_PER_SEC);
         wall.push_back(result.nodes[std::size_t(node)].wall_seconds);
         draw.push_back(result.nodes[std::size_t(node)].draw_seconds);
     }
-    return {{"wall", wall}, {"draw", draw}};
+    return {{"wall", wall}, {"draw", draw}, {"cpu", cpu}};
 }
 
 void draw_pictures(const Options& options) {

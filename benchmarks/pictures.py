@@ -51,7 +51,7 @@ class Drawer:
         return (self.plugins / f"{plugin}.so").exists()
 
     def draw(self, name, nodes, outputs, timed=(), repeat=9, warm_up=2):
-        """{"values": {"node.port": ...}, "times": {"node": {"wall": [s], "draw": [s]}}}"""
+        """{"values": {"node.port": ...}, "times": {"node": {"wall": [s], "draw": [s], "cpu": [s]}}}"""
         self.folder.mkdir(parents=True, exist_ok=True)
         graph = self.folder / f"{name}.yaml"
         graph.write_text(graph_text(nodes, outputs))

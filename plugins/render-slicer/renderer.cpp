@@ -89,6 +89,7 @@ struct Prepared {
     Hash blocks_key;
     ValueRange range;               // of the tables; covers what reconstruction can give
     TexturePtr occupancy;           // null: nothing to leap over
+    TexturePtr ceiling;             // for maxima: the largest u of every block
     std::size_t seen = 0;           // blocks
     // Per texel unit; see Gradients.
     struct Stored {
@@ -118,11 +119,15 @@ TexturePtr keep_table(const TransferPtr& transfer, const Hash& k, Evaluation& ev
     })->texture;
 }
 
+bool is_slabs(const S& s) {
+    return s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
+}
+bool is_shaded(const S& s) { return s.shading && s.compositing != S::Compositing::x_ray; }
+bool is_modulated(const S& s) {
+    return s.modulation != glm::dvec2(0) && s.compositing != S::Compositing::isosurface;
+}
 bool uses_gradient(const Scene& scene) {
-    const S& s = scene.settings;
-    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
-    return (s.shading && s.compositing != S::Compositing::x_ray && s.compositing != S::Compositing::mip) ||
-           (slabs && (s.modulation != glm::dvec2(0) || scene.transfer->two));
+    return is_shaded(scene.settings) || is_modulated(scene.settings) || scene.transfer->two;
 }
 
 double smoothing_side(S::Gradient g) {
@@ -135,12 +140,13 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
     const S& s = scene.settings;
     const TransferFunction& tf = *scene.transfer;
     const bool iso = s.compositing == S::Compositing::isosurface;
+    const bool mip = s.compositing == S::Compositing::mip;
     struct Kept {
         TexturePtr texture;
         std::size_t seen = 0;
     };
     Hash what = iso ? key("iso", s.iso_value)
-                    : s.compositing == S::Compositing::mip ? key("valid") : hash_of(tf);
+                    : mip ? key("mip", hash_of(tf), {}) : hash_of(tf);
     auto kept = Keep::instance().get<Kept>(
         owner, key("occupancy", what, p.blocks_key),
         [&](std::uint64_t& bytes) {
@@ -149,8 +155,9 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
             for (std::size_t i = 0; i < seen.size(); ++i) {
                 const glm::dvec2 r(p.blocks->ranges[i]);
                 if (r.x > r.y) continue;  // no valid voxel
+                // Below a value up to which all is transparent, no maximum is seen.
                 seen[i] = iso ? r.x <= s.iso_value && s.iso_value <= r.y
-                              : s.compositing == S::Compositing::mip || tf.max_extinction(r.x, r.y) > 0;
+                              : tf.max_extinction(mip ? p.blocks->all.min : r.x, r.y) > 0;
                 out->seen += seen[i];
             }
             if (out->seen == 0) return out;
@@ -231,13 +238,28 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
                 return std::make_shared<Prepared::Stored>(Prepared::Stored{t, largest});
             });
 
+    if (s.compositing == S::Compositing::mip && s.skipping)
+        p.ceiling = keep.get<KeptTexture>(
+            owner, key("ceiling", p.blocks_key, {}), [&](std::uint64_t& bytes) {
+                std::vector<float> largest;
+                for (glm::vec2 r : p.blocks->ranges)
+                    largest.push_back(float((double(r.y) - p.range.min) / p.range.extent()));
+                auto t = std::make_shared<gpu::Texture>(gpu::make_texture(
+                    GL_TEXTURE_3D, GL_R32F, p.blocks->grid, GL_NEAREST, "the blocks of the volume"));
+                gpu::upload(*t, {0, 0, 0}, p.blocks->grid, GL_RED, GL_FLOAT, largest.data());
+                bytes += t->bytes;
+                return std::make_shared<KeptTexture>(KeptTexture{t});
+            })->texture;
+
     const double d = view.plane_distance;
+    const double thickness = is_slabs(s) ? d : tf.reference_length;
     const Hash tables = key("", p.range.min, p.range.max, d);
-    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
-    if (slabs && tf.two) {
+    const bool slabs = is_slabs(s);
+    if (tf.two) {
         const glm::ivec2 size = tf.two->dims;
-        p.emission_2d = keep_table(scene.transfer, key("2d", tables, {}), ev, GL_TEXTURE_2D, size,
-                                   [&] { return emission_table_2d(*tf.two, d); });
+        p.emission_2d = keep_table(scene.transfer, key("2d", tables, key("", thickness)), ev,
+                                   GL_TEXTURE_2D, size,
+                                   [&] { return emission_table_2d(*tf.two, thickness); });
     } else if (slabs && s.classification == S::Classification::pre) {
         p.classified = keep.get<KeptTexture>(
             owner, key("classified", hash_of(tf), key("", d, s.component)), [&](std::uint64_t& bytes) {
@@ -257,7 +279,6 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
                                  return preintegrated_table(tf.one, p.range, s.table_size, d, ev.stop());
                              });
     } else if (s.compositing != S::Compositing::isosurface) {
-        const double thickness = slabs ? d : tf.reference_length;
         p.emission = keep_table(scene.transfer, key("emission", tables, key("", thickness)), ev,
                                 GL_TEXTURE_1D, {kEmissionBins, 1}, [&] {
                                     return emission_table(tf.one, p.range, kEmissionBins, thickness);
@@ -285,28 +306,67 @@ Module over(const Module& m, const std::string& prefix) {
     return out;
 }
 
-gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
+// The scene's lights as the shader wants them: those at the eye, where halfway is no other direction,
+// are one and cheap.
+struct Lighting {
+    Lighting(const Scene& scene, const View& view)
+        : given(scene.lights ? *scene.lights : Lights{}) {
+        for (const Light& l : given.lights) {
+            glm::dvec4 at(-scene.camera->forward(), 0.0);
+            if (l.kind == Light::Kind::directional) at = {glm::normalize(l.position), 0.0};
+            if (l.kind == Light::Kind::point)
+                at = {(l.position - view.middle_world) / view.diagonal, 1.0};
+            if (glm::distance(at, view.eye_place) < 1e-9) {
+                eye_color += glm::vec3(l.color);
+                at_eye = true;
+            } else {
+                place.push_back(glm::vec4(at));
+                color.push_back(glm::vec3(l.color));
+            }
+        }
+    }
+    void set(const gpu::Program& program) const {
+        for (std::size_t i = 0; i < place.size(); ++i) {
+            program.set(fmt::format("light_place[{}]", i).c_str(), place[i]);
+            program.set(fmt::format("light_color[{}]", i).c_str(), color[i]);
+        }
+        program.set("eye_light_color", eye_color);
+        program.set("material",
+                    glm::vec4(given.ambient, given.diffuse, given.specular, given.shininess));
+    }
+    Lights given;
+    bool at_eye = false;
+    glm::vec3 eye_color{0.0f};
+    std::vector<glm::vec4> place;  // of the others
+    std::vector<glm::vec3> color;
+};
+
+gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& lighting) {
     const S& s = scene.settings;
     const gpu::VoxelSource& voxels = p.field->voxels;
-    const bool slabs = s.compositing == S::Compositing::over || s.compositing == S::Compositing::x_ray;
+    const bool slabs = is_slabs(s), shading = is_shaded(s), modulation = is_modulated(s);
     const bool gradient = uses_gradient(scene);
-    const bool shading = s.shading && (s.compositing == S::Compositing::over ||
-                                       s.compositing == S::Compositing::isosurface);
-    const bool modulation = slabs && s.modulation != glm::dvec2(0);
 
-    std::string choices;
+    // Whether any invocation of a SIMD group has x; its own x where the driver cannot tell.
+    std::string choices = epoxy_has_gl_extension("GL_ARB_shader_group_vote")
+                              ? "#extension GL_ARB_shader_group_vote : require\n"
+                                "#define ANY(x) anyInvocationARB(x)\n"
+                              : "#define ANY(x) (x)\n";
     auto choose = [&](bool on, std::string_view name) {
         if (on) choices += fmt::format("#define {}\n", name);
     };
-    const std::size_t lights = scene.lights ? scene.lights->lights.size() : Lights{}.lights.size();
     choose(voxels.color, "COLOR");
     choose(voxels.has_validity, "VALIDITY");
     choose(gpu::context_info().software, "EXACT_FILTER");
     choose(s.ray_length, "RAY_LENGTH");
     choose(s.skipping && p.occupancy, "SKIPPING");
+    choose(p.ceiling != nullptr, "CEILING");
+    choose(gradient, "GRADIENT");
+    choose(p.emission_2d != nullptr, "TRANSFER_2D");
     choose(shading, "SHADING");
     choose(modulation, "MODULATION");
-    choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", std::max<std::size_t>(lights, 1),
+    choose(lighting.at_eye, "EYE_LIGHT");
+    choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", lighting.place.size(),
                            smoothing_side(s.gradient));
 
     const char* kernels[] = {"reconstruction-nearest", "reconstruction-trilinear",
@@ -335,13 +395,14 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
     if (shading) parts.push_back(module("shading"));
     if (modulation) parts.push_back(module("modulation"));
 
+    if (p.emission_2d) parts.push_back(module("emission-2d"));
+    if (p.emission) parts.push_back(module("emission"));
+
     if (!slabs) {
         parts.push_back(module("classification-value"));
         parts.push_back(module(s.compositing == S::Compositing::mip ? "march-mip" : "march-isosurface"));
     } else {
-        if (p.emission_2d) {
-            parts.push_back(module("classification-2d"));
-        } else if (p.classified) {
+        if (p.classified) {
             second_texture("classified");
             parts.push_back(module("classification-pre"));
         } else {
@@ -355,22 +416,8 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p) {
     return gpu::program({module("proxy-screen")}, parts);
 }
 
-void set_lights(const gpu::Program& program, const Lights& lights, const Camera& camera,
-                const View& view) {
-    for (std::size_t i = 0; i < lights.lights.size(); ++i) {
-        const Light& l = lights.lights[i];
-        glm::dvec4 place(-camera.forward(), 0.0);
-        if (l.kind == Light::Kind::directional) place = {glm::normalize(l.position), 0.0};
-        if (l.kind == Light::Kind::point)
-            place = {(l.position - view.middle_world) / view.diagonal, 1.0};
-        program.set(fmt::format("light_place[{}]", i).c_str(), glm::vec4(place));
-        program.set(fmt::format("light_color[{}]", i).c_str(), glm::vec3(l.color));
-    }
-    if (lights.lights.empty()) program.set("light_color[0]", glm::vec3(0.0f));
-    program.set("material", glm::vec4(lights.ambient, lights.diffuse, lights.specular, lights.shininess));
-}
-
-void set_uniforms(const gpu::Program& program, const Scene& scene, const View& view, const Prepared& p) {
+void set_uniforms(const gpu::Program& program, const Scene& scene, const View& view, const Prepared& p,
+                  const Lighting& lighting) {
     const S& s = scene.settings;
     const gpu::VoxelSource& voxels = p.field->voxels;
     const VolumeDesc& desc = p.volume->desc();
@@ -419,6 +466,7 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
     program.set("flat_gradient", 1e-7f);
     if (s.skipping && p.occupancy) {
         program.bind("occupancy", unit++, *p.occupancy);
+        if (p.ceiling) program.bind("ceiling", unit++, *p.ceiling);
         program.set("block_size", float(p.blocks->size));
         program.set("block_last", p.blocks->grid - 1);
     }
@@ -426,7 +474,7 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
     program.set("iso_level", float((s.iso_value - p.range.min) / extent));
     program.set("iso_color", glm::vec3(color_of(scene.transfer->one.at(s.iso_value))));
     program.set("background", background(s));
-    set_lights(program, scene.lights ? *scene.lights : Lights{}, *scene.camera, view);
+    lighting.set(program);
 }
 
 // --- drawing -----------------------------------------------------------------------------------
@@ -581,8 +629,9 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
         Keep::instance().shrink(s.gpu_bytes);
         return only_background(s);
     }
-    gpu::ProgramPtr program = assemble(scene, prepared);
-    set_uniforms(*program, scene, view, prepared);
+    const Lighting lighting(scene, view);
+    gpu::ProgramPtr program = assemble(scene, prepared, lighting);
+    set_uniforms(*program, scene, view, prepared, lighting);
 
     if (ev.wants_provisional() && s.size.x * s.size.y > 128 * 128) {
         Target coarse(glm::max(s.size / 4, glm::ivec2(1)));

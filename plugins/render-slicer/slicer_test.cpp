@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "core/plugin/plugin.h"
 #include "tests/support/run_node.h"
@@ -397,6 +398,51 @@ TEST(SlicerRender, MaximumIntensityShowsTheLargestValue) {
     glm::vec4 c = draw(volume, tf, looking({0, 0, 1}, volume->desc(), kOrthographic),
                        "{size: [16, 16], background: [0, 0, 0, 0], compositing: mip}").image()->at(8, 8);
     EXPECT_NEAR(c.a, -std::expm1(-0.8 * 2), 1e-4);
+}
+
+TEST(SlicerRender, MaximumIntensityIsModulatedAndLit) {
+    VolumePtr volume = make_volume({9, 9, 9}, ScalarType::u8, [](auto, auto, auto z) { return 10.0 * double(z); });
+    TransferPtr tf = transfer({{{0, Emission(0)}, {100, Emission(0.5, 0.25, 0, 1)}}}, 2.0);
+    // Along x every value of a ray is the same; the gradient is 10 across the view: no diffuse light.
+    auto at_middle = [&](const std::string& more) {
+        return draw(volume, tf, looking({1, 0, 0}, volume->desc(), kOrthographic),
+                    "{size: [17, 17], background: [0, 0, 0, 0], compositing: mip" + more + "}").image()->at(8, 8);
+    };
+    const double depth = 0.4 * 2;
+    EXPECT_NEAR(at_middle("").a, -std::expm1(-depth), 1e-3);
+    EXPECT_NEAR(at_middle(", gradient_modulation: [0, 20]").a, -std::expm1(-0.5 * depth), 1e-3);
+    const glm::vec4 lit = at_middle(", shading: true");
+    EXPECT_NEAR(lit.a, -std::expm1(-depth), 1e-3);
+    EXPECT_NEAR(lit.r, Lights{}.ambient * 0.5 * lit.a, 1e-3);
+    EXPECT_NEAR(lit.g, 0.5 * lit.r, 1e-4);
+}
+
+TEST(SlicerRender, MaximumIntensityLeavesOutBlocksThatCannotHoldIt) {
+    VolumePtr volume = ball(ScalarType::u8, {96, 96, 96});
+    Camera camera = looking({0.3, 0.2, 1}, volume->desc(), kPerspective);
+    for (const char* more : {"", ", reconstruction: tricubic"}) {
+        std::string common = std::string("compositing: mip, size: [64, 64]") + more;
+        NodeRun all = draw(volume, soft_shell(), camera, "{skipping: false, " + common + "}");
+        NodeRun some = draw(volume, soft_shell(), camera, "{" + common + "}");
+        EXPECT_LT(worst(*all.image(), *some.image()), 1e-5);
+        EXPECT_LT(some.counters["samples"], 0.5 * all.counters["samples"]);
+    }
+}
+
+TEST(SlicerRender, IsosurfacesAreMetBetweenTwoSlices) {
+    // A lens whose middle is thinner than the distance between two slices.
+    VolumePtr volume = make_volume({41, 41, 41}, ScalarType::f32, [](auto x, auto y, auto z) {
+        return 100 - 0.1 * std::pow(double(x) - 20, 2) - 0.1 * std::pow(double(y) - 20, 2) -
+               4 * std::pow(double(z) - 19.3, 2);
+    });
+    Camera camera = looking({0, 0, 1}, volume->desc(), kOrthographic);
+    camera.height = 40;
+    ImagePtr image = draw(volume, constant_medium(1), camera,
+                          "{size: [80, 80], background: [0, 0, 0, 0], compositing: isosurface, iso_value: 90, "
+                          "slice_distance: 4}").image();
+    double covered = 0;
+    for (glm::vec4 c : image->rgba32f()) covered += c.a / 4;
+    EXPECT_NEAR(covered, std::numbers::pi * 100, 0.1 * std::numbers::pi * 100);
 }
 
 // --- behaviour ---------------------------------------------------------------------------------------

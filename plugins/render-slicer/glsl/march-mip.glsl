@@ -1,32 +1,48 @@
 // The largest value along the ray; its opacity is that of the reference length.
-uniform sampler1D emission_table;  // optical depth over the reference length
-uniform float emission_bins;
-float largest = -1.0;
+float largest = -1.0, largest_at = 0.0;
 #ifdef COLOR
 vec4 largest_texel = vec4(0.0);
 #endif
 bool finished() { return false; }
-void look(Sample s) {
+void look(float m) {
+    Sample s = observe(ray_at(m));
+    bool larger = s.scalar.x > largest && s.scalar.y > 0.0;
+    largest = larger ? s.scalar.x : largest;
+    largest_at = larger ? m : largest_at;
 #ifdef COLOR
-    largest_texel = s.scalar.x > largest ? s.texel : largest_texel;
+    largest_texel = larger ? s.texel : largest_texel;
 #endif
-    largest = s.scalar.y > 0.0 ? max(largest, s.scalar.x) : largest;
+    samples += 1.0;
 }
 void march(float k, float end) {
-    look(observe(ray_at(on_ray(k))));
+    look(on_ray(k));
     while (k < end) {
         k += 1.0;
-        look(observe(ray_at(on_ray(k))));
-        samples += 1.0;
+        look(on_ray(k));
     }
 }
 vec4 picture() {
     if (largest <= -1.0) return vec4(0.0);
-    vec4 e = texture(emission_table, (clamp(largest, 0.0, 1.0) * (emission_bins - 1.0) + 0.5) / emission_bins);
+    vec3 p = ray_at(largest_at);
+#ifdef GRADIENT
+    vec3 g = world_gradient(p);
+#endif
+#ifdef TRANSFER_2D
+    vec4 e = emission_of(largest, length(g));
+#else
+    vec4 e = emission_at(largest);
+#endif
 #ifdef COLOR
     e.a *= largest_texel.a;
     e.rgb = largest_texel.rgb * e.a;
 #endif
+#ifdef MODULATION
+    e *= modulation(g);
+#endif
+    vec3 c = e.rgb / max(e.a, 1e-37);
+#ifdef SHADING
+    c = shade(c, g, p);
+#endif
     float alpha = 1.0 - exp2(-1.44269504 * e.a);
-    return vec4(e.rgb * (alpha / max(e.a, 1e-37)), alpha);
+    return vec4(c, 1.0) * alpha;
 }

@@ -15,6 +15,9 @@ uniform float square_reach;          // index units
 uniform isampler3D occupancy;        // n > 0: all blocks nearer than n are seen; n < 0: none of them is
 uniform float block_size;
 uniform ivec3 block_last;
+#ifdef CEILING
+uniform sampler3D ceiling;           // largest u of every block
+#endif
 #endif
 
 // Where a ray is inside of [lo, hi]: from x to y, empty when x > y.
@@ -53,6 +56,10 @@ void main() {
         while (k < end && stop <= k) {
             ivec3 block = clamp(ivec3((point + k * direction) * inverse_size), ivec3(0), block_last);
             int n = texelFetch(occupancy, block, 0).r;
+#ifdef CEILING
+            // A block of no larger value than the ray has met is as good as empty.
+            if (n > 0) n = texelFetch(ceiling, block, 0).r > largest ? 1 : -1;
+#endif
             float r = float(abs(n));
             vec3 corner = (vec3(block) + mix(vec3(1.0 - r), vec3(r), far_side)) * block_size;
             vec3 leave = mix((corner - point) * inverse, vec3(1e30), across);
