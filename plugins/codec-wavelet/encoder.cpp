@@ -82,9 +82,19 @@ class Encoder {
     FamilyCodec::Planes integers_of(const Box& box, const Buffer& voxels) const {
         const auto components = std::size_t(volume_.desc().components);
         const std::size_t count = box.voxels();
+        FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
+        const int shift = tree_.map.shift();
+        if (!is_float(type()) && bytes_of(type()) <= 2 && shift >= 0) {  // a short cut without floating point
+            with_type(type(), [&](auto t) {
+                const auto values = voxels.as<decltype(t)>();
+                for (std::size_t c = 0; c < components; ++c)
+                    for (std::size_t i = 0; i < count; ++i)
+                        planes[c][i] = std::int32_t(values[i * components + c]) * (1 << shift);
+            });
+            return planes;
+        }
         std::vector<double> values(count * components);
         to_double(type(), voxels.data(), values.size(), values.data());
-        FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
         for (std::size_t c = 0; c < components; ++c) {
             double last = range().min / 2 + range().max / 2;
             for (std::size_t i = 0; i < count; ++i)

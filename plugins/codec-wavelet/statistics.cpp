@@ -101,28 +101,37 @@ class Interpolated {
     BrickError error(const Box& box, std::span<const double> original) const {
         BrickError sum;
         const auto components = std::size_t(tree_.bricks.volume.components);
-        const Corner first = corner(box.lo.x, 0), last = corner(box.hi.x - 1, 0);
-        const std::int64_t x0 = first.first, count = std::min(last.first + 1, level_.dims.x - 1) - x0 + 1;
-        std::vector<double> line(static_cast<std::size_t>(count));
+        std::array<std::vector<Corner>, 3> corners;
+        Box around;  // the samples that take part
+        for (int a = 0; a < 3; ++a) {
+            for (std::int64_t i = box.lo[a]; i < box.hi[a]; ++i) corners[std::size_t(a)].push_back(corner(i, a));
+            around.lo[a] = corners[std::size_t(a)].front().first;
+            around.hi[a] = std::min(corners[std::size_t(a)].back().first + 2, level_.dims[a]);
+            for (Corner& c : corners[std::size_t(a)]) c.first -= around.lo[a];
+        }
+        const Index3 n = around.dims();
+        const auto planes = samples_.read(around);
+        std::vector<double> values(around.voxels()), line(static_cast<std::size_t>(n.x));
         for (std::size_t c = 0; c < components; ++c) {
+            std::transform(planes[c].begin(), planes[c].end(), values.begin(),
+                           [&](std::int32_t v) { return delivered(tree_, v); });
             std::size_t voxel = c;
-            for (std::int64_t z = box.lo.z; z < box.hi.z; ++z)
-                for (std::int64_t y = box.lo.y; y < box.hi.y; ++y) {
-                    const Corner cy = corner(y, 1), cz = corner(z, 2);
+            for (const Corner& cz : corners[2])
+                for (const Corner& cy : corners[1]) {
                     std::fill(line.begin(), line.end(), 0.0);
                     for (int k = 0; k < 4; ++k) {
                         const double w = (k & 1 ? cy.f : 1 - cy.f) * (k & 2 ? cz.f : 1 - cz.f);
                         if (w == 0) continue;
-                        const std::int32_t* row = samples_.plane(c) + ((cz.first + (k >> 1)) * level_.dims.y + cy.first + (k & 1)) *
-                                                                          level_.dims.x + x0;
-                        for (std::size_t i = 0; i < line.size(); ++i) line[i] += w * delivered(tree_, row[i]);
+                        const double* row = &values[std::size_t(((cz.first + (k >> 1)) * n.y + cy.first + (k & 1)) * n.x)];
+                        for (std::size_t i = 0; i < line.size(); ++i) line[i] += w * row[i];
                     }
-                    for (std::int64_t x = box.lo.x; x < box.hi.x; ++x, voxel += components) {
-                        if (!std::isfinite(original[voxel])) continue;
-                        const Corner cx = corner(x, 0);
-                        const auto i = std::size_t(cx.first - x0);
+                    for (const Corner& cx : corners[0]) {
+                        const double truth = original[voxel];
+                        voxel += components;
+                        if (!std::isfinite(truth)) continue;
+                        const auto i = std::size_t(cx.first);
                         const double v = cx.f > 0 ? line[i] * (1 - cx.f) + line[i + 1] * cx.f : line[i];
-                        const double e = std::abs(v - original[voxel]);
+                        const double e = std::abs(v - truth);
                         sum.squares += e * e;
                         sum.largest = std::max(sum.largest, e);
                     }

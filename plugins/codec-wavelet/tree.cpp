@@ -117,12 +117,14 @@ void FamilyCodec::rebuild(Details& d) const {
     for_each_band_row(d, [&](int mask, std::int32_t* q, int n) {
         const double step = d.step[std::size_t(mask)];
         if (step <= 1) return;
+        std::int32_t any = 0;  // most rows are empty
+        for (int x = 0; x < n; ++x) any |= q[x];
+        if (any == 0) return;
+        const double one = quantiser.centre_one * step + 0.5, more = quantiser.centre_more * step + 0.5;
         for (int x = 0; x < n; ++x) {
-            if (q[x] == 0) continue;
             const double magnitude = std::abs(double(q[x]));
-            const double centre = magnitude == 1 ? quantiser.centre_one : quantiser.centre_more;
-            const double size = std::min((magnitude + centre) * step, 2147483647.0);
-            const auto value = std::int32_t(size + 0.5 > 2147483647.0 ? 2147483647.0 : size + 0.5);
+            const double size = std::min(magnitude * step + (magnitude == 1 ? one : more), 2147483647.0);
+            const auto value = q[x] == 0 ? 0 : std::int32_t(size);
             q[x] = q[x] < 0 ? -value : value;
         }
     });
@@ -199,6 +201,24 @@ void FamilyCodec::decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims,
     inverse(d.q, dims, d.shape.halved, tree_.rounding, scratch);
 }
 
+namespace {
+
+// Integers of the tree with `fraction` bits below the unit, halves rounded up.
+template <class T>
+void unfold(const std::int32_t* from, std::size_t count, std::size_t components, int fraction, T lo, T hi, T* out) {
+    const std::int32_t half = fraction > 0 ? 1 << (fraction - 1) : 0;
+    const auto low = std::int32_t(lo), high = std::int32_t(hi);
+    const auto one = [=](std::int32_t v) {
+        return T(std::clamp(std::int32_t(std::uint32_t(v) + std::uint32_t(half)) >> fraction, low, high));
+    };
+    if (components == 1)  // apart, for the compiler's sake
+        for (std::size_t i = 0; i < count; ++i) out[i] = one(from[i]);
+    else
+        for (std::size_t i = 0; i < count; ++i) out[i * components] = one(from[i]);
+}
+
+}  // namespace
+
 void FamilyCodec::to_voxels(const Planes& planes, std::size_t count, std::byte* out) const {
     const VolumeDesc& volume = tree_.bricks.volume;
     auto [lo, hi] = limits_of(volume.type);
@@ -207,6 +227,15 @@ void FamilyCodec::to_voxels(const Planes& planes, std::size_t count, std::byte* 
         hi = std::min(hi, volume.range->max);
     }
     const std::size_t components = planes.size();
+    // Small integers take a short cut without floating point.
+    const int fraction = tree_.map.shift();
+    if (!is_float(volume.type) && bytes_of(volume.type) <= 2 && fraction >= 0)
+        return with_type(volume.type, [&, low = lo, high = hi](auto t) {
+            using T = decltype(t);
+            if constexpr (sizeof(T) <= 2)
+                for (std::size_t c = 0; c < components; ++c)
+                    unfold(planes[c].data(), count, components, fraction, T(low), T(high), reinterpret_cast<T*>(out) + c);
+        });
     std::vector<double> values(count * components);
     for (std::size_t c = 0; c < components; ++c)
         for (std::size_t i = 0; i < count; ++i)

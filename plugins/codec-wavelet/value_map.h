@@ -1,8 +1,10 @@
 // Voxel values to the integers of the tree and back.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "core/data/volume.h"
 
@@ -17,10 +19,14 @@ struct ValueMap {
     double value(std::int32_t tree) const { return double(tree) * step + offset; }
     std::int32_t tree(double v) const {  // of a finite value
         constexpr double most = 1 << 26;
-        return std::int32_t(std::llround(std::fmin(std::fmax((v - offset) / step, -most), most)));
+        const double t = std::clamp((v - offset) / step, -most, most);
+        return std::int32_t(t < 0 ? t - 0.5 : t + 0.5);
     }
-    // Which value stands in the tree for one that is not finite: the hole is interpolated over by nobody,
-    // so the middle of the range disturbs least.
+    // Bits below the unit, where the integers are those of the voxels shifted; else -1.
+    int shift() const {
+        const int bits = -std::ilogb(step);
+        return offset == 0 && bits >= 0 && bits < 16 && std::ldexp(1.0, -bits) == step ? bits : -1;
+    }
 };
 
 inline constexpr double kTreeBits = 24;

@@ -87,8 +87,12 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     const std::size_t count = box.voxels(), components = std::size_t(volume.components);
     const FamilyCodec codec(tree, *index_.coder);
 
-    FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
-    Buffer voxels;
+    // Large blocks are expensive to get anew for every family, so each thread keeps its own.
+    thread_local FamilyCodec::Planes planes;
+    thread_local Bytes fine;
+    planes.resize(components);
+    for (auto& plane : planes) plane.resize(count);
+    Buffer voxels;  // above level 0
     try {
         const FamilyPlace& place = index_.families[std::size_t(id.level)]
                                                   [place_in(families_of(tree, id.level), family.index)];
@@ -101,14 +105,12 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
         ByteReader in(place.size ? bytes : std::span(nothing));
         codec.decode(family, low, in, planes);
         if (id.level == 0) {
-            Buffer fine(count * volume.voxel_bytes(), "brick");
+            fine.resize(count * volume.voxel_bytes());
             codec.to_voxels(planes, count, fine.data());
             if (place.size) {
                 decode_distances(volume.type, in.block(), fine.data(), count * components);
                 decode_patches(volume.type, in.bytes(in.left()), fine.data(), count * components);
             }
-            voxels = Buffer(count * tree.bricks.tree_voxel_bytes(), "brick");
-            convert(volume.type, fine.data(), tree.bricks.tree_type, voxels.data(), count * components);
         } else {
             voxels = tree_voxels(tree, planes, count);
         }
@@ -125,7 +127,10 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
         const Box part = desc().box_of(child);
         brick->stored = part.dims();
         brick->voxels = Buffer(part.voxels() * desc().tree_voxel_bytes(), "brick");
-        copy_box(part, voxels.data(), box, brick->voxels.data(), part, desc().tree_voxel_bytes());
+        if (id.level == 0)
+            convert_box(part, volume.type, fine.data(), box, desc().tree_type, brick->voxels.data(), part, volume.components);
+        else
+            copy_box(part, voxels.data(), box, brick->voxels.data(), part, desc().tree_voxel_bytes());
         if (state.size() > 0) {
             const std::size_t each = components * sizeof(std::int32_t);
             brick->decoder_state = Buffer(part.voxels() * each, "brick");
