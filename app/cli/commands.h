@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/graph/document.h"
+
 namespace voxloom::cli {
 
 struct RunArguments {
@@ -23,6 +25,8 @@ struct RunArguments {
     double cache_gib = 4;
 };
 int run(const RunArguments& arguments, std::stop_token stop);
+// The same of a graph that is no file; arguments.graph is not looked at.
+int run(const Document& document, const RunArguments& arguments, std::stop_token stop);
 
 struct CheckArguments {
     std::filesystem::path graph;
@@ -44,5 +48,26 @@ struct InfoArguments {
     bool json = false;
 };
 int info(const InfoArguments& arguments, std::stop_token stop);
+
+struct CompressArguments {
+    std::filesystem::path in, out;
+    std::string codec = "wavelet";
+    std::string target = "lossless";
+    std::string amount_key;                  // of the target's parameter; empty: it has none
+    double amount = 0;
+    std::string coder;                       // empty: the codec's own choice
+    int brick = 0;                           // 0: the codec's own choice
+    bool json = false;
+    bool quiet = false;
+};
+int compress(const CompressArguments& arguments, std::stop_token stop);
+
+struct DecompressArguments {
+    std::filesystem::path in, out;
+    int level = 0;
+    bool json = false;
+    bool quiet = false;
+};
+int decompress(const DecompressArguments& arguments, std::stop_token stop);
 
 }  // namespace voxloom::cli

@@ -22,6 +22,7 @@ A graph is a YAML file of nodes: what reads, what compresses, what draws. Begin 
   voxloom nodes slicer.render                             how to use one
   voxloom check graphs/first-look.yaml                    every problem, with its line
   voxloom info my.nrrd                                    what is in a file
+  voxloom compress my.nrrd my.vxw --psnr 50               compress a volume; decompress undoes it
 Results go to standard output, progress and messages to standard error.)";
 
 // Ctrl-C asks the run to stop; a second one ends the program at once.
@@ -97,6 +98,44 @@ int main(int argc, char** argv) {
     command->add_flag("--values", info.values, "Read the voxels too: range, mean, share of zeros");
     command->add_flag("--json", info.json, "As JSON");
     command->callback([&] { status = cli::info(info, stop_source.get_token()); });
+
+    cli::CompressArguments compress;
+    command = app.add_subcommand("compress", "Compress a volume to a file");
+    command->add_option("in", compress.in, "A volume: a file, or a folder of slices")->required();
+    command->add_option("out", compress.out, "The file to write, such as volume.vxw")->required();
+    command->add_option("--codec", compress.codec, "The codec")->capture_default_str();
+    command->add_option("--coder", compress.coder, "The codec's entropy coder, such as dense or fast");
+    command->add_option("--brick", compress.brick, "Voxels of a brick along each axis");
+    CLI::Option_group* target = command->add_option_group("target", "What to reach; without, nothing is lost");
+    target->require_option(0, 1);
+    target->add_flag_callback("--lossless", [&] { compress.target = "lossless"; }, "Every bit comes back");
+    const auto aim = [&](const char* option, const char* choice, const char* key, const char* doc) {
+        target->add_option_function<double>(option, [&compress, choice, key](double amount) {
+            compress.target = choice;
+            compress.amount_key = key;
+            compress.amount = amount;
+        }, doc);
+    };
+    aim("--psnr", "psnr", "psnr", "Peak signal-to-noise ratio over the value range, in dB");
+    aim("--max-error", "max-error", "max_error", "No voxel is further off than this");
+    aim("--bpv", "bpv", "bpv", "Bits a voxel, everything included");
+    aim("--ratio", "ratio", "ratio", "Bytes of the original over bytes of the file");
+    aim("--threshold", "threshold", "threshold", "Wavelet coefficients below this are dropped");
+    command->add_flag("--json", compress.json, "The report on standard output");
+    command->add_flag("--quiet", compress.quiet, "No progress");
+    command->footer("Example: voxloom compress head.nrrd head.vxw --psnr 50");
+    command->callback([&] { status = cli::compress(compress, stop_source.get_token()); });
+
+    cli::DecompressArguments decompress;
+    command = app.add_subcommand("decompress", "Decode a compressed file to a volume");
+    command->add_option("in", decompress.in, "The compressed file")->required();
+    command->add_option("out", decompress.out, "The volume to write, such as volume.nrrd")->required();
+    command->add_option("--level", decompress.level, "0 is the finest; each further one has half the samples")
+        ->check(CLI::Range(0, 64))->capture_default_str();
+    command->add_flag("--json", decompress.json, "The report on standard output");
+    command->add_flag("--quiet", decompress.quiet, "No progress");
+    command->footer("Example: voxloom decompress head.vxw head.nrrd --level 1");
+    command->callback([&] { status = cli::decompress(decompress, stop_source.get_token()); });
 
     try {
         app.parse(argc, argv);

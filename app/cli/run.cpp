@@ -155,8 +155,12 @@ void print_messages(const Plan& plan, const RunResult& result) {
 }  // namespace
 
 int run(const RunArguments& arguments, std::stop_token stop) {
+    load_registry();  // what is wrong with plugins is said first
+    return run(Document::load(arguments.graph), arguments, stop);
+}
+
+int run(const Document& document, const RunArguments& arguments, std::stop_token stop) {
     const Registry& registry = load_registry();
-    const Document document = Document::load(arguments.graph);
     Plan plan = voxloom::check(document.graph(), registry,
                                {arguments.overrides, std::filesystem::current_path(), 0});
     for (const Problem& problem : plan.problems)

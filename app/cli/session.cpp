@@ -11,6 +11,7 @@ namespace voxloom::cli {
 const Registry& load_registry() {
     // Never destroyed: values made by plugins may outlive main().
     static Registry& registry = *new Registry;
+    if (!registry.ids().empty()) return registry;
     LoadReport report = load_plugins(registry);
     for (const std::string& problem : report.problems)
         fmt::print(stderr, "voxloom: plugin not loaded: {}\n", problem);

@@ -6,7 +6,7 @@
 
 namespace voxloom::cli {
 
-// Loads all plugins; what is refused is said on standard error, and the rest works.
+// Loads all plugins, once; what is refused is said on standard error, and the rest works.
 // Throws Error when there is not a single node.
 const Registry& load_registry();
 

@@ -53,7 +53,7 @@ TEST_F(Cli, helpTeachesWithExamples) {
     Ran r = run("--help");
     EXPECT_EQ(r.status, 0);
     EXPECT_THAT(r.out, AllOf(HasSubstr("voxloom run"), HasSubstr("--set"), HasSubstr("voxloom nodes")));
-    for (const char* command : {"run", "check", "nodes", "info"})
+    for (const char* command : {"run", "check", "nodes", "info", "compress", "decompress"})
         EXPECT_EQ(run(std::string(command) + " --help").status, 0) << command;
 }
 
@@ -172,6 +172,31 @@ TEST_F(Cli, interruptEndsARunAndLeavesNothingHalf) {
     Ran r = run("run g.yaml --out results & pid=$!; sleep 1; kill -INT $pid; wait $pid; echo status $?");
     EXPECT_THAT(slurp(folder.path() / ".stdout") + r.out, HasSubstr("status 130"));
     EXPECT_TRUE(!fs::exists(folder.path() / "results") || fs::is_empty(folder.path() / "results"));
+}
+
+TEST_F(Cli, compressAndDecompressGiveTheSameFileBack) {
+    std::string voxels(20 * 17 * 9, '\0');
+    for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = char(i * i % 51);
+    const fs::path raw = write("v.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 17 9\nencoding: raw\n\n" + voxels);
+    const Ran packed = run("compress v.nrrd v.vxw --coder fast");
+    EXPECT_EQ(packed.status, 0) << packed.err;
+    EXPECT_EQ(run("decompress v.vxw back.nrrd").status, 0);
+    EXPECT_THAT(slurp(folder.path() / "back.nrrd"), ::testing::EndsWith(voxels));
+    EXPECT_EQ(run("decompress v.vxw half.nrrd --level 1").status, 0);
+    EXPECT_THAT(slurp(folder.path() / "half.nrrd"), HasSubstr("sizes: 10 9 9"));
+    const auto lossless = fs::file_size(folder.path() / "v.vxw");
+    EXPECT_EQ(run("compress v.nrrd v.vxw --max-error 20").status, 0);
+    EXPECT_LT(fs::file_size(folder.path() / "v.vxw"), lossless);
+}
+
+TEST_F(Cli, compressingNonsenseIsOneSentence) {
+    EXPECT_EQ(run("compress a.nrrd b.vxw --psnr 40 --lossless").status, 2);
+    EXPECT_THAT(run("compress a.nrrd b.vxw --codec none").err, HasSubstr("no codec 'none'"));
+    write("a.vxw", "nothing of the kind");
+    const Ran r = run("decompress a.vxw b.nrrd");
+    EXPECT_EQ(r.status, 1);
+    EXPECT_THAT(r.err, HasSubstr("a.vxw"));
+    EXPECT_FALSE(fs::exists(folder.path() / "b.nrrd"));
 }
 
 TEST_F(Cli, aPluginFolderWithoutPluginsIsSaid) {
