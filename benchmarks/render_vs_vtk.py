@@ -55,7 +55,7 @@ TRANSFERS = {
     "isosurfaces": {"preset": "isosurfaces"},
     "smooth": {"preset": "ramp", "ramp_start": 0.15, "ramp_end": 1.0, "ramp_opacity": 0.1},
 }
-SLICE_DISTANCES = (0.25, 0.5, 1, 2)
+SLICE_DISTANCES = (0.25, 0.5, 1, 2, 3, 4)
 VTK_STEPS = (0.25, 0.5, 1, 2)
 COLUMNS = ("scene", "transfer", "shaded", "size", "renderer", "setting", "ms", "rmse", "psnr_db",
            "max_error", "speed_vs_vtk_gpu")

@@ -117,7 +117,6 @@ void View::set(const gpu::Program& p) const {
     p.set("middle", glm::vec3(middle));
     p.set("index_to_place", glm::mat3(index_to_place));
     p.set("gradient_to_world", glm::mat3(gradient_to_world));
-    p.set("eye_place", glm::vec4(eye_place));
 }
 
 }  // namespace voxloom::slicer

@@ -2,23 +2,22 @@
 // loop runs to the next slab that is, the outer one pays for it. On SIMD machines, where a branch
 // costs both of its sides, this is what makes the unseen ones cheap; the invocations of a group stop
 // together where they can vote, so that none waits for another that has more slabs to pay for.
+// The inner loop asks for no more than opacity: colour is looked up once more where it is needed.
 void march(float k, float end) {
-    float m = on_ray(k);
-    Sample front = observe(ray_at(m));
+    float from = 0.0, m = on_ray(k);
+    Sample front, back = observe(ray_at(m));
     while (k < end && !finished()) {
-        vec4 e = vec4(0.0);
-        float from = m;
         bool seen = false;
         while (k < end && !seen) {
             k += 1.0;
             from = m;
-            m = on_ray(k);
-            Sample back = observe(ray_at(m));
-            e = slab(front, back);
-            samples += 1.0;
             front = back;
-            seen = ANY(e.a > 0.0);
+            m = on_ray(k);
+            back = observe(ray_at(m));
+            samples += 1.0;
+            seen = ANY(slab(front, back).a > 0.0);
         }
+        vec4 e = slab(front, back);
         vec3 p = ray_at(0.5 * (from + m));
         vec3 g = world_gradient(p);
 #ifdef MODULATION

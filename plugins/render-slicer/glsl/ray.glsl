@@ -6,6 +6,11 @@ uniform vec3 step_0, step_x, step_y;     // from one plane to the next along it
 uniform vec4 slope;                      // world slope of the ray: x0 + x1 * x, y0 + y1 * y
 uniform vec2 pixel_scale;                // a coarse picture asks for every n-th ray
 
+#ifdef SHADING
+uniform mat3 index_to_place;             // world axes
+vec3 to_eye;                             // direction, world axes
+#endif
+
 vec3 ray_point, ray_step;
 float ray_first, ray_last;               // m where it enters and leaves what is drawn
 float slab_length = 1.0;                 // length along the ray between two planes / their distance
@@ -17,6 +22,9 @@ float on_ray(float k) { return clamp(k, ray_first, ray_last); }
 void aim(vec2 pixel) {
     ray_point = point_0 + pixel.x * point_x + pixel.y * point_y;
     ray_step = step_0 + pixel.x * step_x + pixel.y * step_y;
+#ifdef SHADING
+    to_eye = -normalize(index_to_place * ray_step);
+#endif
 #ifdef RAY_LENGTH
     vec2 s = slope.xz + slope.yw * pixel;
     slab_length = sqrt(1.0 + dot(s, s));

@@ -4,9 +4,7 @@ uniform vec4 light_place[LIGHTS + 1];  // w 0: direction towards the light; 1: i
 uniform vec3 light_color[LIGHTS + 1];
 uniform vec3 eye_light_color;          // of all lights at the eye
 uniform vec4 material;                 // ambient, diffuse, specular, shininess
-uniform mat3 index_to_place;
 uniform vec3 middle;                   // index coordinates
-uniform vec4 eye_place;                // w 0: direction towards the viewer; 1: position
 uniform float flat_gradient;           // below it a gradient has no direction: ambient alone
 
 float highlight(float cosine) { return exp2(material.w * log2(max(cosine, 1e-6))); }
@@ -16,19 +14,16 @@ vec3 shade(vec3 c, vec3 g, vec3 p) {
     float size = dot(g, g);
     float lit = size > flat_gradient * flat_gradient ? 1.0 : 0.0;
     vec3 n = g * inversesqrt(max(size, 1e-30));
-    vec3 place = index_to_place * (p - middle);
-    vec3 v = eye_place.xyz - eye_place.w * place;
-    v *= inversesqrt(dot(v, v));
     vec3 sum = c * material.x;
 #ifdef EYE_LIGHT
     // Halfway between the eye and a light at the eye is the eye.
-    float facing = abs(dot(n, v));
+    float facing = abs(dot(n, to_eye));
     sum += lit * eye_light_color *
            (c * (material.y * facing) + material.z * highlight(facing));
 #endif
     for (int i = 0; i < LIGHTS; ++i) {
-        vec3 l = normalize(light_place[i].xyz - light_place[i].w * place);
-        vec3 h = l + v;
+        vec3 l = normalize(light_place[i].xyz - light_place[i].w * (index_to_place * (p - middle)));
+        vec3 h = l + to_eye;
         h /= max(length(h), 1e-6);
         sum += lit * light_color[i] *
                (c * (material.y * abs(dot(n, l))) + material.z * highlight(abs(dot(n, h))));
