@@ -70,8 +70,8 @@ function(voxloom_discover_tests target)
   if(label STREQUAL "unit")
     add_dependencies(unit-tests ${target})
   endif()
-  # What is not ours, and why, stands in cmake/tsan.supp and tests/sanitizers/leaks.cpp. Memory that is not there must come back as
-  # the error that tests ask for, as it does without a sanitizer.
+  # What is not ours, and why, stands in cmake/tsan.supp and tests/sanitizers/leaks.cpp. Memory that
+  # is not there must come back as the error that tests ask for, as it does without a sanitizer.
   set(sanitizer)
   if(VOXLOOM_SANITIZE MATCHES "thread")
     set(sanitizer ENVIRONMENT_MODIFICATION

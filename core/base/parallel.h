@@ -24,19 +24,19 @@ void parallel_for(std::int64_t begin, std::int64_t end, std::int64_t grain, cons
         return;
     }
     Meter* meter = Meter::current();
-    auto task = [&](const tbb::blocked_range<std::int64_t>& range) {
-        tsan::InTask in_task;
+    auto task = [&](std::int64_t lo, std::int64_t hi) {
         MeterScope charge(meter);
         check_stop(stop);
-        body(range.begin(), range.end());
+        body(lo, hi);
     };
-    struct Joined {
-        ~Joined() { tsan::after_tasks(); }
-    } joined;
-    tsan::before_tasks();
+#if defined(__SANITIZE_THREAD__)
+    tsan::parallel_for(begin, end, grain, task);
+#else
     tbb::this_task_arena::isolate([&] {
-        tbb::parallel_for(tbb::blocked_range<std::int64_t>(begin, end, std::size_t(grain)), task);
+        tbb::parallel_for(tbb::blocked_range<std::int64_t>(begin, end, std::size_t(grain)),
+                          [&](const auto& range) { task(range.begin(), range.end()); });
     });
+#endif
 }
 
 }  // namespace voxloom
