@@ -28,6 +28,7 @@ namespace {
 
 constexpr int kSteps = 24;                 // decisions of the unary part that have contexts of their own
 constexpr int kInputs = 6;
+constexpr int kMixers = 9;                 // sets of weights, chosen by the neighbours' sizes
 constexpr int kBlock = 4;
 
 // token_of() for a context: no more than `levels` classes.
@@ -43,13 +44,13 @@ struct Model {
     Chance sign[7][9][3][3][3];
     Chance block[3][4][5][10];
     Chance band[7][2];
-    std::int32_t weights[2][kSteps][3][kInputs];
+    std::int32_t weights[kSteps][3][kMixers][kInputs];
 
     Model() {
-        for (auto& set : weights)
-            for (auto& step : set)
-                for (auto& type : step)
-                    for (auto& w : type) w = 65536 * 28 / 100;
+        for (auto& step : weights)
+            for (auto& type : step)
+                for (auto& set : type)
+                    for (auto& w : set) w = 65536 * 28 / 100;
     }
 };
 
@@ -265,7 +266,8 @@ class Pass {
             token = token_of(magnitude);
         }
         int t = 0;
-        while (code_more(contexts, t, token > t))
+        const int mixer = level_of(nearby / 2, kMixers);
+        while (code_more(contexts, mixer, t, token > t))
             if (++t > kMaxToken) fail("a number is out of range");
         const int bits = low_bits_of(t);
         std::uint32_t value = first_of(t), rest = magnitude - value;
@@ -289,9 +291,9 @@ class Pass {
     }
 
     // Is the token larger than t?
-    bool code_more(Chance* const* contexts, int t, bool more) {
+    bool code_more(Chance* const* contexts, int mixer, int t, bool more) {
         const int step = std::min(t, kSteps - 1);
-        std::int32_t* const weights = model_.weights[d_.finest][step][type_];
+        std::int32_t* const weights = model_.weights[step][type_][mixer];
         int inputs[kInputs];
         std::int64_t sum = 0;
         for (int k = 0; k < kInputs - 1; ++k) {
@@ -358,10 +360,10 @@ void code_tables(Coding& coding, Chance* all, std::size_t count, Model& model) {
         all[i].p = std::uint16_t(squash((int(at) << 6) + 32 - 2047));
         all[i].seen = kTrainedSeen;
     }
-    for (auto& set : model.weights)
-        for (auto& step : set)
-            for (auto& type : step)
-                for (std::int32_t& w : type) {
+    for (auto& step : model.weights)
+        for (auto& type : step)
+            for (auto& set : type)
+                for (std::int32_t& w : set) {
                     const int level = std::clamp((w >> 10) + 128, 0, 255);
                     w = (std::int32_t(code_bits(coding, weight, std::uint32_t(level), 8)) - 128) * 1024 + 512;
                 }

@@ -101,12 +101,34 @@ void FamilyCodec::quantise(Details& d) const {
                 if (std::abs(double(q[x])) < threshold) q[x] = 0;
         });
     }
-    for_each_band_row(d, [&](int mask, std::int32_t* q, int n) {
-        const double step = d.step[std::size_t(mask)];
-        if (step <= 1) return;
-        for (int x = 0; x < n; ++x) {
-            const double size = std::abs(double(q[x])) / step;
-            const auto number = size < kDeadZone ? 0 : std::max(1, std::int32_t(size + kRoundUp));
+    for (int mask : kBandOrder) {
+        const Band band = d.shape.band(mask);
+        const double scale = 1 / d.step[std::size_t(mask)];
+        if (!d.shape.has(band) || scale >= 1) continue;
+        for (int z = 0; z < band.dims.z; z += kQuantBlock)
+            for (int y = 0; y < band.dims.y; y += kQuantBlock)
+                for (int x = 0; x < band.dims.x; x += kQuantBlock) quantise_block(d, band, {x, y, z}, scale);
+    }
+}
+
+void FamilyCodec::quantise_block(Details& d, const Band& band, glm::ivec3 lo, double scale) const {
+    const glm::ivec3 hi = glm::min(lo + kQuantBlock, band.dims);
+    const auto each_row = [&](auto&& use) {
+        for (int z = lo.z; z < hi.z; ++z)
+            for (int y = lo.y; y < hi.y; ++y) use(d.q + d.shape.at(band.lo + glm::ivec3(lo.x, y, z)));
+    };
+    const auto number_of = [scale](std::int32_t c, double zone) {
+        const double size = std::abs(double(c)) * scale;
+        return size < zone ? 0 : std::max(1, std::int32_t(size + kRoundUp));
+    };
+    std::int64_t sum = 0;
+    each_row([&](const std::int32_t* q) {
+        for (int x = 0; x < hi.x - lo.x; ++x) sum += number_of(q[x], kDeadZone);
+    });
+    const double zone = sum == 1 ? kDeadZoneOfOne : sum == 2 ? kDeadZoneOfTwo : sum <= 4 ? kDeadZoneOfFour : kDeadZone;
+    each_row([&](std::int32_t* q) {
+        for (int x = 0; x < hi.x - lo.x; ++x) {
+            const std::int32_t number = number_of(q[x], zone);
             q[x] = q[x] < 0 ? -number : number;
         }
     });

@@ -83,6 +83,7 @@ class FamilyCodec {
     Details details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const;
     void set_steps(Details& d, glm::ivec3 fine_stride) const;
     void quantise(Details& d) const;
+    void quantise_block(Details& d, const Band& band, glm::ivec3 lo, double scale) const;
     void rebuild(Details& d) const;
     void encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const;
     void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, class ByteReader& in) const;
@@ -94,6 +95,10 @@ class FamilyCodec {
 // Where the quantiser rounds: |c| / step below `first` gives 0, and what is left up by `up`. A wide dead
 // zone costs little error, since small coefficients are many, and saves most of their bits.
 inline constexpr double kDeadZone = 0.75, kRoundUp = 0.3;
+// A number that stands nearly alone in its block costs ten bits or so, more than the error it saves:
+// the zone is wider where the numbers of a block of 4^3 add up to 1, 2, or at most 4. One per cent of the rate.
+inline constexpr double kDeadZoneOfOne = 1.1, kDeadZoneOfTwo = 0.95, kDeadZoneOfFour = 0.85;
+inline constexpr int kQuantBlock = 4;
 inline constexpr double kCentreOne = (kDeadZone + 2 - kRoundUp) / 2 - 1 - 0.12;  // less the density's slope
 inline constexpr double kCentreMore = 0.5 - kRoundUp - 0.04;
 
