@@ -609,7 +609,7 @@ class Checker {
 
     static double memory_of(const Plan::Node& node) {
         double bytes = double(node.working_bytes);
-        if (node.type->cacheable)
+        if (!node.type->writes_files)
             for (const ValueDesc& output : node.outputs) bytes += memory_of(output);
         return bytes;
     }

@@ -238,7 +238,7 @@ void Run::prepare() {
         reports_[i].state = NodeState::waiting;
         if (!node.ok) continue;
         const bool again = std::ranges::find(options_.again, int(i)) != options_.again.end();
-        if (!node.type->writes_files && node.type->cacheable && !again)
+        if (!node.type->writes_files && !again)
             run.result = cache_.find(run.key);
         if (run.result) continue;
         for (const auto& sources : node.inputs)
@@ -356,7 +356,7 @@ void Run::execute(int node) {
     report.wall_seconds = double(wall_ns() - started_ns) * 1e-9;
     report.cpu_seconds = double(draws ? process_cpu_ns() - process_cpu : meter.cpu_ns()) * 1e-9;
     report.peak_bytes = std::uint64_t(meter.peak_bytes());
-    if (result && !type.writes_files && type.cacheable)
+    if (result && !type.writes_files)
         cache_.store(runs_[std::size_t(node)].key, result);
 
     std::lock_guard lock(mutex_);

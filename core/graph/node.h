@@ -89,8 +89,6 @@ struct NodeType {
     std::vector<ParamSpec> params;
     Thread thread = Thread::worker;
     bool writes_files = false;   // never cached; asked for when it has no consumer
-    // False for nodes that only wrap a file: keeping their result costs nothing, computing neither.
-    bool cacheable = true;
     std::string method;          // Markdown for the docs: method, when to use, when not, reference
 
     std::function<void(Description&)> describe;  // null: outputs have their type alone

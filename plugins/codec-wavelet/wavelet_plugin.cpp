@@ -156,7 +156,6 @@ NodeType open_node() {
     type.keywords = {"read", "file", "wavelet", "decompress", "vxw"};
     type.outputs = {{"bricks", PortType::bricks, "The tree, mapped from the file."}};
     type.params = {param::path_in("path", "A file that wavelet.write made.")};
-    type.cacheable = false;
     type.describe = [](Description& node) {
         if (!node.params().was_set("path")) {
             node.problem("no file is given", "path");

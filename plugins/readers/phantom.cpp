@@ -276,7 +276,6 @@ NodeType phantom_type() {
             .for_experts(),
     };
     add_grid_params(type.params, {64, 64, 64});
-    type.cacheable = false;
     type.method =
         R"(Evaluates a closed formula at the voxels that are read, row by row and in parallel; nothing is held,
 so that a phantom of ten gigabytes costs no memory. The volume carries its value and gradient in
@@ -439,7 +438,6 @@ NodeType series_type() {
         param::integer("seed", 1, "Seed of the waves and of uneven times.").range(0, 4294967294.0),
     };
     add_grid_params(type.params, {32, 32, 32});
-    type.cacheable = false;
     type.method =
         R"(Each step is a phantom of its own, computed where it is read. The mapping to stored values is the
 same for all times. `moving-sphere` is the distance to a sphere on a tilted orbit, `rotating-waves` a

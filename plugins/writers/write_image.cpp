@@ -84,7 +84,6 @@ void add_image_writer(Registry& registry) {
             .shown_if("alpha", {"flatten"}),
     };
     type.writes_files = true;
-    type.cacheable = false;
     type.method =
         R"(Pictures are premultiplied inside. PNG stores straight alpha, so colours are divided by alpha and
 rounded; values outside of 0 to 1 are clamped, NaN becomes 0. EXR stores premultiplied floats as they

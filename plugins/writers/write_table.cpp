@@ -18,7 +18,6 @@ void add_table_writer(Registry& registry) {
     type.params = {param::path_out("path", "table.csv",
                                    "The file; its extension is the format: .csv or .json.")};
     type.writes_files = true;
-    type.cacheable = false;
     type.method =
         R"(CSV as RFC 4180 has it, units in the header (`time [s]`), numbers in their shortest exact form
 whatever the locale, `nan`, `inf` and `-inf` as these words. JSON holds the columns with their units

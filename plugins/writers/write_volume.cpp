@@ -217,7 +217,6 @@ void add_volume_writer(Registry& registry) {
             .shown_if("compression", {"gzip"}),
     };
     type.writes_files = true;
-    type.cacheable = false;
     type.method =
         R"(The volume is read in slabs of 16 MiB and appended to the file, so that memory stays bounded whatever
 its size; the file has a temporary name until it is whole. Dims, scalar type, components, spacing,
