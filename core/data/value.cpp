@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/base/text.h"
+#include "core/data/selection.h"
 
 namespace voxloom {
 

@@ -12,7 +12,6 @@
 #include "core/data/bricks.h"
 #include "core/data/camera.h"
 #include "core/data/image.h"
-#include "core/data/selection.h"
 #include "core/data/transfer_function.h"
 #include "core/data/volume.h"
 
@@ -20,6 +19,8 @@ namespace voxloom {
 
 class Series;
 class Lattice;
+struct Selection;
+using SelectionPtr = std::shared_ptr<const Selection>;
 using SeriesPtr = std::shared_ptr<const Series>;
 using LatticePtr = std::shared_ptr<const Lattice>;
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/data/selection.h"
 #include "tests/support/volumes.h"
 
 namespace voxloom::testing {
@@ -209,6 +210,8 @@ Value sample_value(PortType type, Index3 dims) {
         }
         case PortType::selection: {
             auto selection = std::make_shared<Selection>();
+            selection->of = std::make_shared<BricksDesc>(FlatBricks(sample_volume(dims)).desc());
+            selection->policy = "sample";
             if (Box::of(dims).voxels() > 0) selection->bricks.push_back({});
             return SelectionPtr(selection);
         }
