@@ -56,6 +56,7 @@ struct CompressArguments {
     std::string amount_key;                  // of the target's parameter; empty: it has none
     double amount = 0;
     std::string coder;                       // empty: the codec's own choice
+    std::string faces;                       // empty: the codec's own choice
     int brick = 0;                           // 0: the codec's own choice
     bool json = false;
     bool quiet = false;

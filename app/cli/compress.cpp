@@ -50,6 +50,7 @@ int compress(const CompressArguments& arguments, std::stop_token stop) {
     std::string set = "target: " + arguments.target;
     if (!arguments.amount_key.empty()) set += fmt::format(", {}: {}", arguments.amount_key, to_yaml(arguments.amount));
     if (!arguments.coder.empty()) set += ", coder: " + to_yaml(arguments.coder);
+    if (!arguments.faces.empty()) set += ", faces: " + to_yaml(arguments.faces);
     if (arguments.brick > 0) set += fmt::format(", brick: {}", to_yaml(std::to_string(arguments.brick)));
     return run_text(fmt::format("voxloom: 1\n"
                                 "nodes:\n"

@@ -34,7 +34,7 @@ std::int64_t family_count(const TreeDesc& tree, int level) {
 }
 // A family's parent as a box of its level; the root has none.
 Box parent_box(const TreeDesc& tree, FamilyId family) {
-    return tree.bricks.box_of({family.level + 1, family.index});
+    return stored_box(tree, {family.level + 1, family.index});
 }
 
 struct Encoded {
@@ -78,8 +78,17 @@ class Encoder {
         return voxels;
     }
 
-    // What is not finite is filled with the last value before it: a jump would cost details.
-    FamilyCodec::Planes integers_of(const Box& box, const Buffer& voxels) const {
+    Buffer part_of(const Buffer& voxels, const Box& box, const Box& part) const {
+        const std::size_t each = volume_.desc().voxel_bytes();
+        Buffer out(part.voxels() * each, "voxels to encode");
+        copy_box(part, voxels.data(), box, out.data(), part, each);
+        return out;
+    }
+
+    // What is not finite is filled with the last value before it: a jump would cost details. Shared faces are
+    // filled from what they hold themselves.
+    FamilyCodec::Planes integers_of(FamilyId family, const Buffer& voxels) const {
+        const Box box = box_of(tree_, family);
         const auto components = std::size_t(volume_.desc().components);
         const std::size_t count = box.voxels();
         FamilyCodec::Planes planes(components, std::vector<std::int32_t>(count));
@@ -95,23 +104,40 @@ class Encoder {
         }
         std::vector<double> values(count * components);
         to_double(type(), voxels.data(), values.size(), values.data());
-        for (std::size_t c = 0; c < components; ++c) {
-            double last = range().min / 2 + range().max / 2;
-            for (std::size_t i = 0; i < count; ++i)
-                if (std::isfinite(values[i * components + c])) {
-                    last = values[i * components + c];
-                    break;
-                }
-            for (std::size_t i = 0; i < count; ++i) {
-                const double v = values[i * components + c];
-                if (std::isfinite(v)) last = v;
-                planes[c][i] = tree_.map.tree(last);
+        for_each_part(shape_of(tree_, family), [&](glm::ivec3 lo, glm::ivec3 hi) {
+            const auto each = [&](auto&& use) {
+                for (std::int64_t z = lo.z; z < hi.z; ++z)
+                    for (std::int64_t y = lo.y; y < hi.y; ++y)
+                        for (std::int64_t x = lo.x; x < hi.x; ++x) use(std::size_t((z * box.dims().y + y) * box.dims().x + x));
+            };
+            for (std::size_t c = 0; c < components; ++c) {
+                double last = std::numeric_limits<double>::quiet_NaN();
+                each([&](std::size_t i) {
+                    if (std::isnan(last) && std::isfinite(values[i * components + c])) last = values[i * components + c];
+                });
+                if (std::isnan(last)) last = range().min / 2 + range().max / 2;
+                each([&](std::size_t i) {
+                    if (std::isfinite(values[i * components + c])) last = values[i * components + c];
+                    planes[c][i] = tree_.map.tree(last);
+                });
             }
-        }
+        });
         return planes;
     }
-    FamilyCodec::Planes originals(int level, const Box& box) const {
-        return level == 0 ? integers_of(box, voxels_of(box)) : original_[std::size_t(level)].read(box);
+    FamilyCodec::Planes originals(FamilyId family) const {
+        const Box box = box_of(tree_, family);
+        return family.level == 0 ? integers_of(family, voxels_of(box)) : original_[std::size_t(family.level)].read(box);
+    }
+    // The inside of a family's box, and each shared face, edge and corner.
+    template <class Use>
+    static void for_each_part(const Shape& shape, const Use& use) {
+        std::array<std::vector<int>, 3> at;
+        for (int a = 0; a < 3; ++a)
+            at[std::size_t(a)] = cuts(shape.dims[a], shape.shared.lo[a], shape.shared.hi[a], shape.dims[a]);
+        for (std::size_t k = 0; k + 1 < at[2].size(); ++k)
+            for (std::size_t j = 0; j + 1 < at[1].size(); ++j)
+                for (std::size_t i = 0; i + 1 < at[0].size(); ++i)
+                    use(glm::ivec3(at[0][i], at[1][j], at[2][k]), glm::ivec3(at[0][i + 1], at[1][j + 1], at[2][k + 1]));
     }
 
     void analyse() {
@@ -128,9 +154,9 @@ class Encoder {
                     const FamilyId family = family_at(tree_, l, i);
                     const Shape shape = shape_of(tree_, family);
                     const glm::ivec3 n = shape.low();
-                    auto planes = originals(l, box_of(tree_, family));
+                    auto planes = originals(family);
                     for (auto& plane : planes) {
-                        forward(plane.data(), shape.dims, shape.halved, tree_.rounding, scratch);
+                        forward(plane.data(), shape.dims, shape.halved, tree_.rounding, scratch, shape.shared);
                         std::size_t to = 0;  // keeps the low band only
                         for (int z = 0; z < n.z; ++z)
                             for (int y = 0; y < n.y; ++y, to += std::size_t(n.x))
@@ -138,7 +164,8 @@ class Encoder {
                                             plane.begin() + std::ptrdiff_t(to));
                         plane.resize(to);
                     }
-                    original_[std::size_t(l) + 1].write(parent_box(tree_, family), planes);
+                    original_[std::size_t(l) + 1].write(tree_.bricks.box_of({l + 1, family.index}), planes,
+                                                        parent_box(tree_, family));
                 }
             }, stop_);
         tell(0.1);
@@ -160,9 +187,9 @@ class Encoder {
             parallel_for(0, family_count(tree_, l), 4, [&](std::int64_t lo, std::int64_t hi) {
                 for (std::int64_t i = lo; i < hi; ++i) {
                     const FamilyId family = family_at(tree_, l, i);
-                    auto planes = originals(l, box_of(tree_, family));
+                    auto planes = originals(family);
                     codec.restore(family, parent_of(family), planes, [](const Details&) {});
-                    decoded_[std::size_t(l)].write(box_of(tree_, family), planes);
+                    decoded_[std::size_t(l)].write(own_box(tree_, family), planes, box_of(tree_, family));
                 }
             }, stop_);
         }
@@ -177,7 +204,7 @@ class Encoder {
             for (std::int64_t i = step / 2; i < count; i += step) {
                 check_stop(stop_);
                 const FamilyId family = family_at(tree_, l, i);
-                auto planes = originals(l, box_of(tree_, family));
+                auto planes = originals(family);
                 codec.restore(family, parent_of(family), planes, [&](const Details& d) { coder->train(d); });
             }
         }
@@ -187,17 +214,19 @@ class Encoder {
 
     Encoded encode_family(const FamilyCodec& codec, FamilyId family) const {
         Encoded result;
-        const Box box = box_of(tree_, family);
         const VolumeDesc& volume = tree_.bricks.volume;
         if (family.level > 0) {
-            auto planes = originals(family.level, box);
+            auto planes = originals(family);
             codec.encode(family, parent_of(family), planes, result.bytes);
             drop_if_empty(result.bytes);
             return result;
         }
-        const Buffer exact = voxels_of(box);
-        auto planes = integers_of(box, exact);
+        const Box with_faces = box_of(tree_, family), box = own_box(tree_, family);
+        Buffer exact = voxels_of(with_faces);
+        auto planes = integers_of(family, exact);
         codec.encode(family, parent_of(family), planes, result.bytes);
+        FamilyCodec::crop(planes, with_faces, box);
+        if (box != with_faces) exact = part_of(exact, with_faces, box);
         const std::size_t count = box.voxels(), values = count * planes.size();
         Buffer near(count * volume.voxel_bytes(), "voxels decoded");
         codec.to_voxels(planes, count, near.data());
@@ -247,9 +276,7 @@ class Encoder {
         std::vector<BrickId> bricks = tree_.top() > 0 ? desc.finer({1, family.index}) : std::vector<BrickId>{{0, glm::ivec3(0)}};
         for (const BrickId& id : bricks) {
             const Box part = desc.box_of(id);
-            Buffer truth_voxels(part.voxels() * desc.volume.voxel_bytes(), "brick"), given_voxels(truth_voxels.size(), "brick");
-            copy_box(part, exact.data(), box, truth_voxels.data(), part, desc.volume.voxel_bytes());
-            copy_box(part, near.data(), box, given_voxels.data(), part, desc.volume.voxel_bytes());
+            const Buffer truth_voxels = part_of(exact, box, part), given_voxels = part_of(near, box, part);
             const std::size_t count = part.voxels() * components;
             std::vector<double> truth(count), given(count);
             to_double(type(), truth_voxels.data(), count, truth.data());
@@ -561,6 +588,7 @@ std::string provenance_of(const EncodeOptions& options) {
     std::string text = fmt::format("voxloom wavelet.encode, target {}", kTargets[int(options.target)]);
     if (options.target != Target::lossless) text += " " + shortest(options.amount);
     text += fmt::format(", coder {}, brick {}", name_of(options.coder), options.brick);
+    if (options.faces == Faces::shared) text += ", shared faces";
     if (!options.source.empty()) text += ", from " + options.source;
     return text;
 }
@@ -576,6 +604,7 @@ TreeDesc plan(const VolumeDesc& volume, const EncodeOptions& options) {
     tree.bricks.tree_type = tree_type_of(volume.type);
     tree.bricks.levels = pyramid_levels(volume, tree.bricks.brick);
     tree.rounding = options.rounding;
+    tree.faces = options.faces;
     tree.coder = options.coder;
     tree.provenance = provenance_of(options);
     return tree;

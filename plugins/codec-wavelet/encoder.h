@@ -17,6 +17,7 @@ struct EncodeOptions {
     CoderKind coder = CoderKind::dense;
     int brick = 16;
     Rounding rounding = Rounding::unbiased;
+    Faces faces = Faces::block;
     std::string source;  // for the provenance
 };
 

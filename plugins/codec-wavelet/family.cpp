@@ -27,6 +27,15 @@ double band_norm(int mask, glm::ivec3 fine_stride, glm::bvec3 axes) {
     return norm;
 }
 
+std::vector<int> cuts(int n, bool shared_lo, bool shared_hi, int step) {
+    std::vector<int> at{0};
+    const int last = shared_hi ? n - 1 : n;
+    if (shared_lo && n > 1) at.push_back(1);
+    while (at.back() < last) at.push_back(std::min(at.back() + step, last));
+    if (at.back() < n) at.push_back(n);
+    return at;
+}
+
 namespace {
 
 // Calls transform(dense copy, its dims) for what each set of halved high axes covers, and puts it back.
@@ -54,13 +63,17 @@ void each_detail_box(std::int32_t* box, const Shape& shape, const Transform& tra
 }  // namespace
 
 void split_family(std::int32_t* box, const Shape& shape, Rounding rounding, std::vector<std::int32_t>& scratch) {
-    forward(box, shape.dims, shape.halved, rounding, scratch);
-    each_detail_box(box, shape, [&](std::int32_t* part, glm::ivec3 dims) { forward(part, dims, shape.split, rounding, scratch); });
+    forward(box, shape.dims, shape.halved, rounding, scratch, shape.shared);
+    each_detail_box(box, shape, [&](std::int32_t* part, glm::ivec3 dims) {
+        forward(part, dims, shape.split, rounding, scratch, shape.shared);
+    });
 }
 
 void join_family(std::int32_t* box, const Shape& shape, Rounding rounding, std::vector<std::int32_t>& scratch) {
-    each_detail_box(box, shape, [&](std::int32_t* part, glm::ivec3 dims) { inverse(part, dims, shape.split, rounding, scratch); });
-    inverse(box, shape.dims, shape.halved, rounding, scratch);
+    each_detail_box(box, shape, [&](std::int32_t* part, glm::ivec3 dims) {
+        inverse(part, dims, shape.split, rounding, scratch, shape.shared);
+    });
+    inverse(box, shape.dims, shape.halved, rounding, scratch, shape.shared);
 }
 
 }  // namespace voxloom::wavelet

@@ -24,6 +24,7 @@ struct Shape {
     glm::ivec3 dims{1};    // voxels of the children together
     glm::bvec3 halved{false};
     glm::bvec3 split{false};
+    Ends shared{};         // faces that a neighbouring family has, too
 
     glm::ivec3 low() const { return low_dims(dims, halved); }
     std::size_t voxels() const { return std::size_t(dims.x) * std::size_t(dims.y) * std::size_t(dims.z); }
@@ -55,6 +56,10 @@ double wavelet_norm(int j);
 // Norm of a coefficient of a band on level 0. fine_stride is the children's: 2^(times halved); `axes` are
 // those halved or split.
 double band_norm(int mask, glm::ivec3 fine_stride, glm::bvec3 axes);
+
+// Where to cut n samples of an axis into pieces of at most `step`, 0 and n included. A shared end is a piece of its
+// own, so that whatever is done piece by piece does the same to a shared face on both of its sides.
+std::vector<int> cuts(int n, bool shared_lo, bool shared_hi, int step);
 
 // The transform of lifting.h, and of the details along the split axes.
 void split_family(std::int32_t* box, const Shape& shape, Rounding rounding, std::vector<std::int32_t>& scratch);

@@ -164,6 +164,7 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
     w.number(std::uint8_t(tree.coder));
     w.number(std::uint8_t(tree.split));
     w.number(std::uint8_t(tree.distances));
+    w.number(std::uint8_t(tree.faces));
     w.number(tree.map.step);
     w.number(tree.map.offset);
     w.number(tree.quantiser.step);
@@ -173,7 +174,7 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
     w.text(tree.provenance);
 }
 
-TreeDesc read_tree(ByteReader& r) {
+TreeDesc read_tree(ByteReader& r, std::uint32_t version) {
     TreeDesc tree;
     VolumeDesc& v = tree.bricks.volume;
     for (int a = 0; a < 3; ++a) v.dims[a] = r.number<std::int64_t>();
@@ -222,6 +223,7 @@ TreeDesc read_tree(ByteReader& r) {
     const auto rounding = r.number<std::uint8_t>(), coder = r.number<std::uint8_t>();
     tree.split = r.number<std::uint8_t>() != 0;
     tree.distances = r.number<std::uint8_t>() != 0;
+    const auto faces = version >= 2 ? r.number<std::uint8_t>() : std::uint8_t(0);
     tree.map.step = r.number<double>();
     tree.map.offset = r.number<double>();
     tree.quantiser.step = r.number<double>();
@@ -229,7 +231,8 @@ TreeDesc read_tree(ByteReader& r) {
     tree.quantiser.centre_one = r.number<double>();
     tree.quantiser.centre_more = r.number<double>();
     tree.provenance = r.text();
-    if (rounding > 1 || coder >= kCoderKinds) fail("its coder or rounding is not known to this version");
+    if (rounding > 1 || coder >= kCoderKinds || faces > 1) fail("its coder, rounding or faces are not known to this version");
+    tree.faces = Faces(faces);
     tree.rounding = Rounding(rounding);
     tree.coder = CoderKind(coder);
     const Quantiser& q = tree.quantiser;
@@ -242,10 +245,10 @@ TreeDesc read_tree(ByteReader& r) {
 
 std::uint64_t grid_count(glm::ivec3 grid) { return checked_product(Index3(grid), 1, "a grid of bricks"); }
 
-TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload) {
+TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload, std::uint32_t version) {
     ByteReader r(head);
     TreeIndex index;
-    index.tree = read_tree(r);
+    index.tree = read_tree(r, version);
     TreeDesc& tree = index.tree;
     index.coder = make_coder(tree.coder, r.block());
     index.families.resize(tree.bricks.levels.size());
@@ -342,7 +345,7 @@ std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes
         ByteReader r(bytes.subspan(sizeof kMagic));
         const auto version = r.number<std::uint32_t>(), endian = r.number<std::uint32_t>();
         if (endian != kEndian) fail("its byte order is not this machine's");
-        if (version != kFileVersion) fail("it has version {}, and version {} is known", version, kFileVersion);
+        if (version < 1 || version > kFileVersion) fail("it has version {}, and versions 1 to {} are known", version, kFileVersion);
         const auto head_size = r.number<std::uint64_t>(), payload = r.number<std::uint64_t>(), hash = r.number<std::uint64_t>();
         if (head_size > r.left() || payload != r.left() - head_size)
             fail("it should have {} bytes of head and {} of data, and has {} of both", head_size, payload, r.left());
@@ -351,7 +354,7 @@ std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes
         hasher.bytes(bytes.first(kPreamble - 8));
         hasher.bytes(head);
         if (hasher.finish().lo != hash) fail("its head's checksum is wrong");
-        TreeIndex index = read_head(head, payload);
+        TreeIndex index = read_head(head, payload, version);
         index.tree.bricks.compressed_bytes = bytes.size();
         const std::uint64_t resident = index_memory(index);
         return std::make_shared<WaveletBricks>(std::move(index), r.bytes(payload), std::move(keeper), resident);

@@ -18,11 +18,11 @@ class LevelStore {
     Index3 dims() const { return dims_; }
     const std::int32_t* plane(std::size_t component) const { return planes_[component].as<std::int32_t>().data(); }
 
-    // Disjoint boxes may be written from several threads.
-    void write(const Box& box, const FamilyCodec::Planes& values) {
+    // The part `box` of values that fill `values_box`. Disjoint boxes may be written from several threads.
+    void write(const Box& box, const FamilyCodec::Planes& values, const Box& values_box) {
         for (std::size_t c = 0; c < planes_.size(); ++c)
-            copy_box(box, reinterpret_cast<const std::byte*>(values[c].data()), box, planes_[c].data(), Box::of(dims_),
-                     sizeof(std::int32_t));
+            copy_box(box, reinterpret_cast<const std::byte*>(values[c].data()), values_box, planes_[c].data(),
+                     Box::of(dims_), sizeof(std::int32_t));
     }
     FamilyCodec::Planes read(const Box& box) const {
         FamilyCodec::Planes values(planes_.size(), std::vector<std::int32_t>(box.voxels()));

@@ -29,9 +29,14 @@ T updated(T left, T right) {
     return T(plus(plus(left, right), T(2)) >> 2);
 }
 
+struct Shared {
+    bool lo, hi;
+};
+Shared at_ends(const Ends& shared, int axis) { return {shared.lo[axis], shared.hi[axis]}; }
+
 // One line along x, from `in` to `out`, which do not overlap.
 template <class T>
-void forward_line(const T* __restrict in, T* __restrict out, int n, T p) {
+void forward_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared) {
     const int low = (n + 1) / 2, high = n / 2;
     T* s = out;
     T* d = out + low;
@@ -41,16 +46,20 @@ void forward_line(const T* __restrict in, T* __restrict out, int n, T p) {
     s[0] = plus(in[0], updated(d[0], d[0]));
     for (int i = 1; i < high; ++i) s[i] = plus(in[2 * i], updated(d[i - 1], d[i]));
     if (high < low) s[high] = plus(in[2 * high], updated(d[high - 1], d[high - 1]));
+    if (shared.lo) s[0] = in[0];
+    if (shared.hi) s[low - 1] = in[n - 1];
 }
 
 template <class T>
-void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, T* __restrict even) {
+void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared, T* __restrict even) {
     const int low = (n + 1) / 2, high = n / 2;
     const T* s = in;
     const T* d = in + low;
     even[0] = minus(s[0], updated(d[0], d[0]));
     for (int i = 1; i < high; ++i) even[i] = minus(s[i], updated(d[i - 1], d[i]));
     if (high < low) even[high] = minus(s[high], updated(d[high - 1], d[high - 1]));
+    if (shared.lo) even[0] = s[0];
+    if (shared.hi) even[low - 1] = s[low - 1];
     const int inner = (n - 1) / 2;
     for (int i = 0; i < inner; ++i) {
         out[2 * i] = even[i];
@@ -66,7 +75,7 @@ void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, T* __re
 
 // The same across n rows of `width` samples, so that the inner loops run along the rows.
 template <class T>
-void forward_rows(const T* __restrict in, T* __restrict out, int n, std::size_t width, T p) {
+void forward_rows(const T* __restrict in, T* __restrict out, int n, std::size_t width, T p, Shared shared) {
     const int low = (n + 1) / 2, high = n / 2;
     auto source = [&](int i) { return in + std::size_t(i) * width; };
     T* const s = out;
@@ -85,10 +94,12 @@ void forward_rows(const T* __restrict in, T* __restrict out, int n, std::size_t 
         T* to = s + std::size_t(i) * width;
         for (std::size_t x = 0; x < width; ++x) to[x] = plus(here[x], updated(left[x], right[x]));
     }
+    if (shared.lo) std::copy_n(source(0), width, s);
+    if (shared.hi) std::copy_n(source(n - 1), width, s + std::size_t(low - 1) * width);
 }
 
 template <class T>
-void inverse_rows(const T* __restrict in, T* __restrict out, int n, std::size_t width, T p) {
+void inverse_rows(const T* __restrict in, T* __restrict out, int n, std::size_t width, T p, Shared shared) {
     const int low = (n + 1) / 2, high = n / 2;
     const T* const s = in;
     const T* const d = in + std::size_t(low) * width;
@@ -100,6 +111,8 @@ void inverse_rows(const T* __restrict in, T* __restrict out, int n, std::size_t 
         T* to = target(2 * i);
         for (std::size_t x = 0; x < width; ++x) to[x] = minus(here[x], updated(left[x], right[x]));
     }
+    if (shared.lo) std::copy_n(s, width, target(0));
+    if (shared.hi) std::copy_n(s + std::size_t(low - 1) * width, width, target(n - 1));
     for (int i = 0; i < high; ++i) {
         const T* here = d + std::size_t(i) * width;
         const T* left = target(2 * i);
@@ -112,7 +125,8 @@ void inverse_rows(const T* __restrict in, T* __restrict out, int n, std::size_t 
 }  // namespace
 
 template <class T>
-void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch) {
+void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch,
+             Ends shared) {
     const std::size_t width = std::size_t(dims.x), plane = width * std::size_t(dims.y);
     const std::size_t all = plane * std::size_t(dims.z);
     const T p = T(rounding);
@@ -120,22 +134,24 @@ void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std:
     T* from = box;
     T* to = scratch.data();
     if (halved.x && dims.x > 1) {
-        for (std::size_t row = 0; row < all; row += width) forward_line(from + row, to + row, dims.x, p);
+        for (std::size_t row = 0; row < all; row += width) forward_line(from + row, to + row, dims.x, p, at_ends(shared, 0));
         std::swap(from, to);
     }
     if (halved.y && dims.y > 1) {
-        for (std::size_t z = 0; z < all; z += plane) forward_rows(from + z, to + z, dims.y, width, p);
+        for (std::size_t z = 0; z < all; z += plane)
+            forward_rows(from + z, to + z, dims.y, width, p, at_ends(shared, 1));
         std::swap(from, to);
     }
     if (halved.z && dims.z > 1) {
-        forward_rows(from, to, dims.z, plane, p);
+        forward_rows(from, to, dims.z, plane, p, at_ends(shared, 2));
         std::swap(from, to);
     }
     if (from != box) std::memcpy(box, from, all * sizeof(T));
 }
 
 template <class T>
-void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch) {
+void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch,
+             Ends shared) {
     const std::size_t width = std::size_t(dims.x), plane = width * std::size_t(dims.y);
     const std::size_t all = plane * std::size_t(dims.z);
     const T p = T(rounding);
@@ -144,24 +160,26 @@ void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std:
     T* from = box;
     T* to = scratch.data();
     if (halved.z && dims.z > 1) {
-        inverse_rows(from, to, dims.z, plane, p);
+        inverse_rows(from, to, dims.z, plane, p, at_ends(shared, 2));
         std::swap(from, to);
     }
     if (halved.y && dims.y > 1) {
-        for (std::size_t z = 0; z < all; z += plane) inverse_rows(from + z, to + z, dims.y, width, p);
+        for (std::size_t z = 0; z < all; z += plane)
+            inverse_rows(from + z, to + z, dims.y, width, p, at_ends(shared, 1));
         std::swap(from, to);
     }
     if (halved.x && dims.x > 1) {
-        for (std::size_t row = 0; row < all; row += width) inverse_line(from + row, to + row, dims.x, p, even);
+        for (std::size_t row = 0; row < all; row += width)
+            inverse_line(from + row, to + row, dims.x, p, at_ends(shared, 0), even);
         std::swap(from, to);
     }
     if (from != box) std::memcpy(box, from, all * sizeof(T));
 }
 
-template void forward<std::int16_t>(std::int16_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int16_t>&);
-template void inverse<std::int16_t>(std::int16_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int16_t>&);
-template void forward<std::int32_t>(std::int32_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int32_t>&);
-template void inverse<std::int32_t>(std::int32_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int32_t>&);
+template void forward<std::int16_t>(std::int16_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int16_t>&, Ends);
+template void inverse<std::int16_t>(std::int16_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int16_t>&, Ends);
+template void forward<std::int32_t>(std::int32_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int32_t>&, Ends);
+template void inverse<std::int32_t>(std::int32_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int32_t>&, Ends);
 
 double peak_after(double min, double max) {
     const double centre = (min + max) / 2, half = (max - min) / 2;

@@ -27,19 +27,26 @@ inline glm::ivec3 low_dims(glm::ivec3 dims, glm::bvec3 halved) {
     return glm::mix(dims, (dims + 1) / 2, halved);
 }
 
+// Ends of lines whose samples a neighbouring box has, too. Such a sample passes on unfiltered, as the low
+// sample that it is: then whatever becomes of a face depends on the face's samples alone, and both boxes get the
+// same. A high end must be an even sample, that is, lines of an odd length.
+struct Ends {
+    glm::bvec3 lo{false}, hi{false};
+};
+
 // Both work in place on dims.x * dims.y * dims.z samples, x fastest. The transformed box has its low
 // band in front along each halved axis: band (h_x, h_y, h_z) is the sub-box from h ? low : 0 to
 // h ? dims : low. `scratch` grows to the size of the box and can be used again. T is int16_t or int32_t;
 // arithmetic wraps, so that any input is safe and lossless, but bands make sense only within the bounds
 // of peak_after().
 template <class T>
-void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch);
+void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch, Ends shared = {});
 template <class T>
-void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch);
+void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch, Ends shared = {});
 
 // No coefficient, and no sum on the way to one, exceeds this after any number of levels, when the
 // input lies in [min, max]. From the L1 norms of the mirrored analysis functionals: low <= 1.836
-// and high <= 2.970 along each axis, high bands blind to a constant.
+// and high <= 2.970 along each axis, high bands blind to a constant. Shared ends make them smaller.
 double peak_after(double min, double max);
 
 }  // namespace voxloom::wavelet

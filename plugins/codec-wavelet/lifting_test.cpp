@@ -58,6 +58,28 @@ TYPED_TEST(Lifting, ZeroDetailsInterpolateLinearly) {
     EXPECT_EQ(line, (std::vector<TypeParam>{0, 5, 10, 15, 20, 30, 40}));
 }
 
+TYPED_TEST(Lifting, SharedEndsPassOnAsTheyAreAndComeBack) {
+    std::vector<TypeParam> scratch;
+    for (glm::ivec3 dims : {glm::ivec3(3), {17, 9, 5}, {9, 1, 33}})
+        for (int lo = 0; lo < 8; ++lo)
+            for (int hi = 0; hi < 8; ++hi) {
+                const Ends shared{{lo & 1, lo & 2, lo & 4}, {hi & 1, hi & 2, hi & 4}};
+                const auto input = noise<TypeParam>(std::size_t(dims.x * dims.y * dims.z), -32768, 32767, 5);
+                auto box = input;
+                forward(box.data(), dims, glm::bvec3(true), Rounding::unbiased, scratch, shared);
+                const glm::ivec3 low = low_dims(dims, glm::bvec3(true)) - 1;
+                const auto at = [&](glm::ivec3 i) { return std::size_t((i.z * dims.y + i.y) * dims.x + i.x); };
+                if (lo == 7) {
+                    ASSERT_EQ(box[0], input[0]);
+                }
+                if (hi == 7) {
+                    ASSERT_EQ(box[at(low)], input.back());
+                }
+                inverse(box.data(), dims, glm::bvec3(true), Rounding::unbiased, scratch, shared);
+                ASSERT_EQ(box, input) << lo << " " << hi;
+            }
+}
+
 TEST(Lifting, WorkedByHandOnFourSamples) {
     // d0 = 3 - ((1 + 8 + 1) >> 1) = -2, d1 = 2 - ((8 + 8 + 1) >> 1) = -6
     // s0 = 1 + ((-2 - 2 + 2) >> 2) = 0, s1 = 8 + ((-2 - 6 + 2) >> 2) = 6

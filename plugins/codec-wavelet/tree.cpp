@@ -64,16 +64,46 @@ FamilyId family_of(const TreeDesc& tree, BrickId brick) {
     return {brick.level, brick.index};
 }
 
-Box box_of(const TreeDesc& tree, FamilyId family) {
+Box own_box(const TreeDesc& tree, FamilyId family) {
     const Index3 size = Index3(tree.bricks.brick) * glm::mix(Index3(1), Index3(2), halved_below(tree, family.level));
     const Index3 lo = Index3(family.index) * size;
     return {lo, glm::min(lo + size, tree.bricks.levels[std::size_t(family.level)].dims)};
 }
 
+namespace {
+
+Box with_shared_faces(const TreeDesc& tree, int level, Box box) {
+    if (tree.faces == Faces::shared) box.hi = glm::min(box.hi + Index3(1), tree.bricks.levels[std::size_t(level)].dims);
+    return box;
+}
+
+}  // namespace
+
+Box box_of(const TreeDesc& tree, FamilyId family) { return with_shared_faces(tree, family.level, own_box(tree, family)); }
+
 Shape shape_of(const TreeDesc& tree, FamilyId family) {
-    Shape shape{glm::ivec3(box_of(tree, family).dims()), halved_below(tree, family.level)};
+    const Box own = own_box(tree, family), box = box_of(tree, family);
+    Shape shape{glm::ivec3(box.dims()), halved_below(tree, family.level)};
     if (tree.split) shape.split = glm::not_(shape.halved);
+    if (tree.faces == Faces::shared) shape.shared = {glm::greaterThan(own.lo, Index3(0)), glm::greaterThan(box.hi, own.hi)};
     return shape;
+}
+
+Box stored_box(const TreeDesc& tree, BrickId brick) {
+    const Box box = tree.bricks.box_of(brick);
+    return brick.level > 0 ? with_shared_faces(tree, brick.level, box) : box;
+}
+
+void FamilyCodec::crop(Planes& planes, const Box& from, const Box& to) {
+    if (from == to) return;
+    const Index3 n = from.dims(), lo = to.lo - from.lo, count = to.dims();
+    for (auto& plane : planes) {
+        auto end = plane.begin();
+        for (std::int64_t z = 0; z < count.z; ++z)
+            for (std::int64_t y = 0; y < count.y; ++y)
+                end = std::copy_n(plane.begin() + ((lo.z + z) * n.y + lo.y + y) * n.x + lo.x, count.x, end);
+        plane.erase(end, plane.end());
+    }
 }
 
 Details FamilyCodec::details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const {
@@ -105,14 +135,19 @@ void FamilyCodec::quantise(Details& d) const {
         const Band band = d.shape.band(mask);
         const double scale = 1 / d.step[std::size_t(mask)];
         if (!d.shape.has(band) || scale >= 1) continue;
-        for (int z = 0; z < band.dims.z; z += kQuantBlock)
-            for (int y = 0; y < band.dims.y; y += kQuantBlock)
-                for (int x = 0; x < band.dims.x; x += kQuantBlock) quantise_block(d, band, {x, y, z}, scale);
+        const auto cuts_along = [&](int a) {
+            const bool low = !(mask >> a & 1);
+            return cuts(band.dims[a], low && d.shape.shared.lo[a], low && d.shape.shared.hi[a], kQuantBlock);
+        };
+        const auto x = cuts_along(0), y = cuts_along(1), z = cuts_along(2);
+        for (std::size_t k = 0; k + 1 < z.size(); ++k)
+            for (std::size_t j = 0; j + 1 < y.size(); ++j)
+                for (std::size_t i = 0; i + 1 < x.size(); ++i)
+                    quantise_block(d, band, {x[i], y[j], z[k]}, {x[i + 1], y[j + 1], z[k + 1]}, scale);
     }
 }
 
-void FamilyCodec::quantise_block(Details& d, const Band& band, glm::ivec3 lo, double scale) const {
-    const glm::ivec3 hi = glm::min(lo + kQuantBlock, band.dims);
+void FamilyCodec::quantise_block(Details& d, const Band& band, glm::ivec3 lo, glm::ivec3 hi, double scale) const {
     const auto each_row = [&](auto&& use) {
         for (int z = lo.z; z < hi.z; ++z)
             for (int y = lo.y; y < hi.y; ++y) use(d.q + d.shape.at(band.lo + glm::ivec3(lo.x, y, z)));

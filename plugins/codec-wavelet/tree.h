@@ -4,6 +4,12 @@
 // (top, 0) holds the one brick of the coarsest level; its low band is taken further apart down to a single
 // voxel, so that nothing is stored as it is.
 //
+// Families end at the faces of their bricks, where lines are mirrored: a coarse level drawn in place of a finer
+// one, interpolated across the face, then misses it by up to half a cell. With shared faces a family takes
+// in the first layer of its upper neighbours' samples, too. Both do the same to the face between them
+// (Ends of lifting.h), and zero details are linear interpolation across it. The face's details are
+// stored with either family, which costs a few per cent; a family still needs no sibling.
+//
 // Bytes of a family: for each component the coder's bytes, length first; at level 0 then the distances and
 // the patches of exact_layer.h, the former with their length. A family without any is not stored.
 #pragma once
@@ -16,6 +22,8 @@
 #include "plugins/codec-wavelet/value_map.h"
 
 namespace voxloom::wavelet {
+
+enum class Faces : std::uint8_t { block = 0, shared = 1 };
 
 struct FamilyId {
     int level = 0;        // of the children
@@ -33,6 +41,7 @@ struct Quantiser {
 struct TreeDesc {
     BricksDesc bricks;
     Rounding rounding = Rounding::unbiased;
+    Faces faces = Faces::block;
     CoderKind coder = CoderKind::dense;
     ValueMap map;
     bool split = true;        // details are split along axes that are not halved
@@ -51,8 +60,12 @@ ScalarType tree_type_of(ScalarType type);
 
 glm::ivec3 families_of(const TreeDesc& tree, int level);      // grid
 FamilyId family_of(const TreeDesc& tree, BrickId brick);
-Box box_of(const TreeDesc& tree, FamilyId family);             // in its level
-Shape shape_of(const TreeDesc& tree, FamilyId family);         // not of the root
+Box own_box(const TreeDesc& tree, FamilyId family);            // of its bricks, in its level
+Box box_of(const TreeDesc& tree, FamilyId family);             // of what it codes: shared faces, too
+Shape shape_of(const TreeDesc& tree, FamilyId family);         // of box_of(); not of the root
+// What is kept of a decoded brick: above level 0 all that its children's family needs, which is one more layer
+// where faces are shared.
+Box stored_box(const TreeDesc& tree, BrickId brick);
 
 class FamilyCodec {
   public:
@@ -61,6 +74,8 @@ class FamilyCodec {
 
     // One plane of integers (shape.voxels(), x fastest) for each component.
     using Planes = std::vector<std::vector<std::int32_t>>;
+    // Keeps the part `to` of the box `from`.
+    static void crop(Planes& planes, const Box& from, const Box& to);
 
     // --- encoder ---
     // Transforms, quantises and restores: `planes` hold the samples of the family's box and become what the
@@ -83,7 +98,7 @@ class FamilyCodec {
     Details details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const;
     void set_steps(Details& d, glm::ivec3 fine_stride) const;
     void quantise(Details& d) const;
-    void quantise_block(Details& d, const Band& band, glm::ivec3 lo, double scale) const;
+    void quantise_block(Details& d, const Band& band, glm::ivec3 lo, glm::ivec3 hi, double scale) const;
     void rebuild(Details& d) const;
     void encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const;
     void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, class ByteReader& in) const;

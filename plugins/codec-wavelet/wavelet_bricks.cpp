@@ -71,11 +71,17 @@ BrickInfo WaveletBricks::info(BrickId id) const {
     return index_.infos[level][place_in(desc().levels[level].bricks, id.index)];
 }
 
+std::vector<BrickId> WaveletBricks::bricks_of(FamilyId family) const {
+    if (family.level == index_.tree.top()) return {{family.level, family.index}};
+    return desc().finer({family.level + 1, family.index});
+}
+
 std::uint64_t WaveletBricks::family_bytes(BrickId id) const {
     const FamilyId family = family_of(index_.tree, id);
-    const std::uint64_t count = box_of(index_.tree, family).voxels() * std::uint64_t(desc().volume.components);
+    std::uint64_t voxels = 0;
+    for (const BrickId& brick : bricks_of(family)) voxels += stored_box(index_.tree, brick).voxels();
     const bool state = index_.tree.has_state() && id.level > 0;
-    return count * (bytes_of(desc().tree_type) + (state ? sizeof(std::int32_t) : 0));
+    return voxels * (desc().tree_voxel_bytes() + (state ? sizeof(std::int32_t) * std::uint64_t(desc().volume.components) : 0));
 }
 
 std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const {
@@ -83,7 +89,7 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     const TreeDesc& tree = index_.tree;
     const VolumeDesc& volume = tree.bricks.volume;
     const FamilyId family = family_of(tree, id);
-    const Box box = box_of(tree, family);
+    const Box box = box_of(tree, family), own = own_box(tree, family);
     const std::size_t count = box.voxels(), components = std::size_t(volume.components);
     const FamilyCodec codec(tree, *index_.coder);
 
@@ -105,11 +111,12 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
         ByteReader in(place.size ? bytes : std::span(nothing));
         codec.decode(family, low, in, planes);
         if (id.level == 0) {
-            fine.resize(count * volume.voxel_bytes());
-            codec.to_voxels(planes, count, fine.data());
+            FamilyCodec::crop(planes, box, own);
+            fine.resize(own.voxels() * volume.voxel_bytes());
+            codec.to_voxels(planes, own.voxels(), fine.data());
             if (place.size) {
-                decode_distances(volume.type, in.block(), fine.data(), count * components);
-                decode_patches(volume.type, in.bytes(in.left()), fine.data(), count * components);
+                decode_distances(volume.type, in.block(), fine.data(), own.voxels() * components);
+                decode_patches(volume.type, in.bytes(in.left()), fine.data(), own.voxels() * components);
             }
         } else {
             voxels = tree_voxels(tree, planes, count);
@@ -122,13 +129,13 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     Buffer state;
     if (tree.has_state() && id.level > 0) state = interleaved<std::int32_t>(planes, count);
     std::vector<DecodedBrick> bricks;
-    for (const BrickId& child : parent ? desc().finer(*desc().coarser(id)) : std::vector<BrickId>{id}) {
+    for (const BrickId& child : bricks_of(family)) {
         auto brick = std::make_shared<BrickVoxels>();
-        const Box part = desc().box_of(child);
+        const Box part = stored_box(tree, child);
         brick->stored = part.dims();
         brick->voxels = Buffer(part.voxels() * desc().tree_voxel_bytes(), "brick");
         if (id.level == 0)
-            convert_box(part, volume.type, fine.data(), box, desc().tree_type, brick->voxels.data(), part, volume.components);
+            convert_box(part, volume.type, fine.data(), own, desc().tree_type, brick->voxels.data(), part, volume.components);
         else
             copy_box(part, voxels.data(), box, brick->voxels.data(), part, desc().tree_voxel_bytes());
         if (state.size() > 0) {

@@ -42,6 +42,8 @@ class WaveletBricks final : public Bricks {
     std::span<const std::byte> payload() const { return payload_; }
 
   private:
+    std::vector<BrickId> bricks_of(FamilyId family) const;
+
     TreeIndex index_;
     std::span<const std::byte> payload_;
     std::shared_ptr<const void> keeper_;
