@@ -27,6 +27,7 @@ using S = Settings;
 // A loop in a shader may end after 2^16 turns on some drivers; blocks to leap over count as well.
 constexpr double kMostPlanes = 20000;
 constexpr int kEmissionBins = 4096;
+constexpr int kIntegralNodes = 4096;
 
 template <class... Parts>
 Hash key(std::string_view what, Parts... parts) {
@@ -97,21 +98,24 @@ struct Prepared {
         float scale;
     };
     std::shared_ptr<const Stored> gradient;
-    TexturePtr classified, slabs, emission, emission_2d;
+    TexturePtr classified, slabs, integral, emission, emission_2d;
 };
 
 struct KeptTexture {
     TexturePtr texture;
 };
 
+// `build` gives a vector of glm::vec4, or of float for a single channel.
+template <class Build>
 TexturePtr keep_table(const TransferPtr& transfer, const Hash& k, Evaluation& ev, GLenum target,
-                      glm::ivec2 dims, const std::function<std::vector<glm::vec4>()>& build) {
+                      glm::ivec2 dims, const Build& build) {
     return Keep::instance().get<KeptTexture>(transfer, k, [&](std::uint64_t& bytes) {
         const std::int64_t start = wall_ns();
-        std::vector<glm::vec4> table = build();
-        auto t = std::make_shared<gpu::Texture>(gpu::make_texture(
-            target, GL_RGBA32F, {dims, 1}, GL_LINEAR, "the table of the transfer function"));
-        gpu::upload(*t, {0, 0, 0}, {dims, 1}, GL_RGBA, GL_FLOAT, table.data());
+        const auto table = build();
+        const bool single = std::is_same_v<decltype(table), const std::vector<float>>;
+        auto t = std::make_shared<gpu::Texture>(
+            gpu::make_texture(target, single ? GL_R32F : GL_RGBA32F, {dims, 1}, GL_LINEAR, "the table of the transfer function"));
+        gpu::upload(*t, {0, 0, 0}, {dims, 1}, single ? GL_RED : GL_RGBA, GL_FLOAT, table.data());
         bytes += t->bytes;
         ev.count("table ms", double(wall_ns() - start) * 1e-6);
         ev.count("bytes uploaded", double(t->bytes));
@@ -278,6 +282,9 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
                              GL_TEXTURE_2D, glm::ivec2(s.table_size), [&] {
                                  return preintegrated_table(tf.one, p.range, s.table_size, d, ev.stop());
                              });
+        if (has_narrow_peak(tf.one, p.range, s.table_size))
+            p.integral = keep_table(scene.transfer, key("integral", tables, {}), ev, GL_TEXTURE_1D, {kIntegralNodes, 1},
+                                    [&] { return depth_integral(tf.one, p.range, kIntegralNodes, d); });
     } else if (s.compositing != S::Compositing::isosurface) {
         p.emission = keep_table(scene.transfer, key("emission", tables, key("", thickness)), ev,
                                 GL_TEXTURE_1D, {kEmissionBins, 1}, [&] {
@@ -363,6 +370,7 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
     choose(p.ceiling != nullptr, "CEILING");
     choose(gradient, "GRADIENT");
     choose(p.emission_2d != nullptr, "TRANSFER_2D");
+    choose(p.integral != nullptr, "NARROW_PEAKS");
     choose(shading, "SHADING");
     choose(modulation, "MODULATION");
     choose(lighting.at_eye, "EYE_LIGHT");
@@ -440,6 +448,10 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
         program.bind("slab_table", unit++, *p.slabs);
         const double n = s.table_size;
         program.set("slab_map", glm::vec2((n - 1) / n, 0.5 / n));
+    }
+    if (p.integral) {
+        program.bind("depth_integral", unit++, *p.integral);
+        program.set("integral_map", glm::vec2((kIntegralNodes - 1.0) / kIntegralNodes, 0.5 / kIntegralNodes));
     }
     if (p.emission) {
         program.bind("emission_table", unit++, *p.emission);

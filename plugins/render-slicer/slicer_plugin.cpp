@@ -54,7 +54,7 @@ void describe(Description& d) {
     if (volume->color) texel *= 4;
     if (p.boolean("shading")) texel += 8;
     if (p.text("classification") == "pre") texel += 16;
-    d.working_memory(volume->voxels() * texel);
+    d.working_memory(volume->voxels() * texel + (source->by_region ? volume->dense_bytes() : 0));
 }
 
 void evaluate(Evaluation& ev) {

@@ -32,17 +32,36 @@ glm::vec4 entry(const Piece& piece) {
     return glm::vec4(glm::dvec4(piece.light / alpha, 1.0) * depth);
 }
 
+// Mean emission between each two of n nodes.
+std::vector<Emission> means_of(const TransferFunction1D& tf, ValueRange range, int n) {
+    const double bin = range.extent() / (n - 1);
+    std::vector<Emission> mean;
+    for (int i = 0; i + 1 < n; ++i)
+        mean.push_back(tf.integral(range.min + bin * i, range.min + bin * (i + 1)) / bin);
+    return mean;
+}
+
 }  // namespace
+
+bool has_narrow_peak(const TransferFunction1D& tf, ValueRange range, int n) {
+    const std::vector<Emission> mean = means_of(tf, range, n);
+    const auto at = [&](int i) { return mean[std::size_t(std::clamp(i, 0, n - 2))].a; };
+    for (int i = 0; i + 1 < n; ++i)
+        if (at(i) > 2 * std::max(at(i - 2), at(i + 2))) return true;
+    return false;
+}
+
+std::vector<float> depth_integral(const TransferFunction1D& tf, ValueRange range, int n, double d) {
+    std::vector<double> sum = {0};
+    for (const Emission& e : means_of(tf, range, n)) sum.push_back(sum.back() + std::min(d * e.a / (n - 1), kOpaqueBin));
+    std::vector<float> integral;
+    for (double s : sum) integral.push_back(float(s - 0.5 * sum.back()));
+    return integral;
+}
 
 std::vector<glm::vec4> preintegrated_table(const TransferFunction1D& tf, ValueRange range, int n,
                                            double d, const std::stop_token& stop) {
-    const double bin = range.extent() / (n - 1);
-    auto node = [&](int i) { return range.min + bin * i; };
-    // Mean emission over each unit segment.
-    std::vector<Emission> mean(std::size_t(n - 1));
-    for (int i = 0; i + 1 < n; ++i)
-        mean[std::size_t(i)] = tf.integral(node(i), node(i + 1)) / bin;
-
+    const std::vector<Emission> mean = means_of(tf, range, n);
     std::vector<glm::vec4> table(std::size_t(n) * std::size_t(n));
     auto at = [&](int f, int b) -> glm::vec4& {
         return table[std::size_t(b) * std::size_t(n) + std::size_t(f)];

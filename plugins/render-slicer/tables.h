@@ -22,6 +22,18 @@ namespace voxloom::slicer {
 std::vector<glm::vec4> preintegrated_table(const TransferFunction1D& tf, ValueRange range, int n,
                                            double d, const std::stop_token& stop = {});
 
+// Bilinear between its nodes, that table blurs by a bin, which blunts the errors of a field that is not
+// linear in a slab, but gives a peak of a bin or three an opacity that depends on the slices. True where
+// there is such a peak; depth_integral() then has the opacity.
+bool has_narrow_peak(const TransferFunction1D& tf, ValueRange range, int n);
+
+// Optical depth of a slab of thickness d along which the value goes from that of node 0 to each of n
+// nodes, times the share of the range that it crosses; linear between nodes, 0 in the middle. Slab (f, b)
+// is (integral(b) - integral(f)) / (b - f) deep, whatever the slices; not for b near f, where that
+// cancels. A bin counts for at most kOpaqueBin, which lets nothing through.
+inline constexpr double kOpaqueBin = 64;
+std::vector<float> depth_integral(const TransferFunction1D& tf, ValueRange range, int n, double d);
+
 // One entry a node, n >= 2: the transfer function at the value.
 std::vector<glm::vec4> emission_table(const TransferFunction1D& tf, ValueRange range, int n, double d);
 // The nodes of a 2-D transfer function as they are, value fastest.

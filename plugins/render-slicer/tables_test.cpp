@@ -103,6 +103,31 @@ TEST(PreintegratedTable, OpaqueIsOpaqueAndWhatIsBehindItIsNotLost) {
     EXPECT_NEAR(table[std::size_t(64 * n + 48)].a, 1.0, 1e-6);  // only the blue plateau
 }
 
+TEST(DepthIntegral, DifferencesAreDepthsWhateverTheSlices) {
+    const TransferFunction1D peak{{{0.0, Emission(0)}, {4.9, Emission(0)}, {5.0, Emission(3)}, {5.1, Emission(0)}, {10.0, Emission(0)}}};
+    const std::vector<float> integral = depth_integral(peak, {0, 10}, 101, 2.0);
+    // 2 long, through 10 values: the peak's 0.3 is met in 0.06 of it.
+    EXPECT_NEAR(integral.back() - integral.front(), 0.06, 1e-7);
+    EXPECT_NEAR(integral[50] - integral[49], 0.03, 1e-7);
+    EXPECT_EQ(integral[48], integral[0]);
+}
+
+TEST(DepthIntegral, EndlessExtinctionStaysFinite) {
+    const TransferFunction1D wall{{{0.0, Emission(kMaxExtinction)}, {10.0, Emission(kMaxExtinction)}}};
+    for (float i : depth_integral(wall, {0, 10}, 64, 1e6)) EXPECT_LE(std::abs(i), 32 * kOpaqueBin);
+}
+
+TEST(NarrowPeak, IsOneOfAFewBins) {
+    const auto peak = [](double width) {
+        return TransferFunction1D{{{0.0, Emission(0)}, {50 - width, Emission(0)}, {50.0, Emission(1)}, {50 + width, Emission(0)}, {100.0, Emission(0)}}};
+    };
+    EXPECT_TRUE(has_narrow_peak(peak(0.01), {0, 100}, 101));
+    EXPECT_TRUE(has_narrow_peak(peak(1), {0, 100}, 101));
+    EXPECT_FALSE(has_narrow_peak(peak(8), {0, 100}, 101));
+    EXPECT_FALSE(has_narrow_peak(TransferFunction1D{{{0.0, Emission(1)}}}, {0, 100}, 101));
+    EXPECT_FALSE(has_narrow_peak(TransferFunction1D{{{0.0, Emission(0)}}}, {0, 100}, 101));
+}
+
 TEST(PreintegratedTable, ZeroIsExactlyZero) {
     TransferFunction1D tf{{{0, Emission(0)}}};
     for (const glm::vec4& e : preintegrated_table(tf, {0, 1}, 64, 1)) EXPECT_EQ(e, glm::vec4(0));

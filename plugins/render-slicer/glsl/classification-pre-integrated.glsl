@@ -1,25 +1,49 @@
 // Value linear along the ray from front to back: the table holds the exact optical depth of a slab
 // and its mean colour times that depth. Bilinear between its nodes; since the back of one slab is the
-// front of the next, what a peak narrower than a bin loses in one it gains in the other.
+// front of the next, what a peak narrower than a bin loses in one it gains in the other. Where there are
+// such peaks their depth is a difference of integrals, which add up to the same whatever the slices.
 uniform sampler2D slab_table;
 uniform vec2 slab_map;  // u to texture coordinate
+#ifdef NARROW_PEAKS
+uniform sampler1D depth_integral;
+uniform vec2 integral_map;
+const float kCancels = 1e-4;  // the difference of two values below which the table is the better
+float integral_at(float u) { return texture(depth_integral, clamp(u, 0.0, 1.0) * integral_map.x + integral_map.y).r; }
+#define INTEGRAL(u) , integral_at(u)
+#else
+#define INTEGRAL(u)
+#endif
 #ifdef COLOR
-struct Sample { vec2 scalar; vec4 texel; };
+#define TEXEL(t) , clamp(t, 0.0, 1.0)
+#else
+#define TEXEL(t)
+#endif
+struct Sample {
+    vec2 scalar;
+#ifdef COLOR
+    vec4 texel;
+#endif
+#ifdef NARROW_PEAKS
+    float integral;
+#endif
+};
 Sample observe(vec3 p) {
     vec4 t = reconstruct(p);
-    return Sample(scalar_of(t), clamp(t, 0.0, 1.0));
+    vec2 u = scalar_of(t);
+    return Sample(u TEXEL(t) INTEGRAL(u.x));
 }
-#else
-struct Sample { vec2 scalar; };
-Sample observe(vec3 p) { return Sample(scalar_of(reconstruct(p))); }
-#endif
 vec4 slab(Sample f, Sample b) {
     vec2 u = vec2(f.scalar.x, b.scalar.x);
 #ifdef VALIDITY
     // Where one end is invalid the slab is half as thick and has the other's value.
     u = mix(u.yx, u, vec2(f.scalar.y, b.scalar.y));
 #endif
-    vec4 e = texture(slab_table, clamp(u, 0.0, 1.0) * slab_map.x + slab_map.y);
+    u = clamp(u, 0.0, 1.0);
+    vec4 e = texture(slab_table, u * slab_map.x + slab_map.y);
+#ifdef NARROW_PEAKS
+    float across = u.y - u.x;
+    if (abs(across) > kCancels) e *= (b.integral - f.integral) / across / max(e.a, 1e-30);
+#endif
 #ifdef VALIDITY
     e *= 0.5 * (f.scalar.y + b.scalar.y);
 #endif
