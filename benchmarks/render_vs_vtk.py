@@ -4,15 +4,16 @@
 Every renderer gets the same voxels, transfer function and camera; the truth is reference.raycast
 (double precision, exact inside each cell). A picture's error is over red, green and blue, peak 1,
 after rounding to 8 bits, which is what VTK delivers; that alone costs up to 0.0011 RMSE (58.9 dB).
-Milliseconds are medians, the GPU's work finished; only ratios between rows of one run mean
-anything.
+Milliseconds are medians, the GPU's work finished, of the clock on the wall or, with --clock cpu, of
+the processor time of all threads, which other work on the machine disturbs less; only ratios between
+rows of one run mean anything.
 
 Shaded scenes have one light at the eye, where VTK's headlight is, and gradients by central
 differences interpolated like the values, which is what VTK's GPU ray caster computes. Its CPU ray
 caster rounds normals to a table of directions and lights the voxels, not the samples: that is part
 of its error. Surfaces at which light is added without limit are clamped to 1 in every picture.
 
-    benchmarks/render_vs_vtk.py [--build build/release] [--quick] [--out DIR]
+    benchmarks/render_vs_vtk.py [--build build/release] [--quick] [--clock cpu] [--truth DIR] [--out DIR]
 
 writes the table to standard output and as CSV and Markdown to DIR, and after it, for every picture
 of VTK, the fastest of slicer.render whose error is not larger.
@@ -25,6 +26,7 @@ import pathlib
 import statistics
 import sys
 import tempfile
+import time
 
 import numpy as np
 
@@ -57,6 +59,7 @@ TRANSFERS = {
 }
 SLICE_DISTANCES = (0.25, 0.5, 1, 2, 3, 4)
 VTK_STEPS = (0.25, 0.5, 1, 2)
+CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 COLUMNS = ("scene", "transfer", "shaded", "size", "renderer", "setting", "ms", "rmse", "psnr_db",
            "max_error", "speed_vs_vtk_gpu")
 
@@ -72,7 +75,8 @@ def slicer_views(shaded):
     return views
 
 
-def measure(drawer, vtk, scene, source, transfer, shaded, size, repeat, rows):
+def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
+    repeat = options.repeat
     common = {"size": [size, size], "shading": shaded, "gradient": "central"}
     wires = {"source": "ct.volume", "transfer": "tf.transfer", "camera": "camera.camera",
              "lights": "lights.lights"}
@@ -87,13 +91,19 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, repeat, rows):
         "lights": ("scene.lights", {}, {"headlight": 0, "point": [eye], **LIGHT}),
         "truth": ("reference.raycast", wires, common),
     }
-    outputs = ["ct.volume", "tf.transfer", "camera.camera", "truth.image"]
+    # The truth takes the longest by far, and is the same in every run.
+    kept = pathlib.Path(options.truth) / f"{label}.npy" if options.truth else None
+    known = kept is not None and kept.exists()
+    outputs = ["ct.volume", "tf.transfer", "camera.camera"] + ([] if known else ["truth.image"])
     views = slicer_views(shaded) if drawer.has("render-slicer") else {}
     for name, (_, params) in views.items():
         nodes[name] = ("slicer.render", wires, {**common, **params})
         outputs.append(f"{name}.image")
     result = drawer.draw(label, nodes, outputs, timed=views, repeat=repeat)
-    truth = pictures.picture(result, "truth.image")
+    truth = np.load(kept) if known else pictures.picture(result, "truth.image")
+    if kept and not known:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        np.save(kept, truth)
 
     measured = []
 
@@ -102,7 +112,7 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, repeat, rows):
                          *pictures.errors(image, truth)])
 
     for name, (setting, _) in views.items():
-        row("slicer.render", setting, statistics.median(result["times"][name]["wall"]),
+        row("slicer.render", setting, statistics.median(result["times"][name][options.clock]),
             pictures.in_8_bits(pictures.picture(result, f"{name}.image")))
 
     gpu = {}
@@ -115,7 +125,7 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, repeat, rows):
                 vtk, kind, voxels, volume["index_to_world"], table, result["values"]["camera.camera"],
                 (size, size), LIGHT if shaded else None)
             for step in VTK_STEPS:
-                image, seconds = caster.draw(step, repeat)
+                image, seconds = caster.draw(step, repeat, clock=CLOCKS[options.clock])
                 if kind == "gpu":
                     gpu[step] = seconds
                 row(f"VTK {kind.upper()}", f"{step} voxels", seconds, image)
@@ -169,6 +179,8 @@ def main():
     parser.add_argument("--sizes", type=int, nargs="+", help="picture sizes (256 512 1024)")
     parser.add_argument("--scenes", nargs="+", help="only these")
     parser.add_argument("--repeat", type=int, help="pictures per median (9)")
+    parser.add_argument("--clock", choices=CLOCKS, default="wall", help="time by the clock or of the processor")
+    parser.add_argument("--truth", help="folder in which reference pictures are kept from run to run")
     options = parser.parse_args()
 
     vtk = None
@@ -178,7 +190,7 @@ def main():
     except (ImportError, OSError, RuntimeError) as reason:
         print(f"skipped VTK: {reason} (packages python3-vtk9 and xvfb)", file=sys.stderr)
     sizes = options.sizes or ([96] if options.quick else [256, 512, 1024])
-    repeat = options.repeat or (3 if options.quick else 9)
+    options.repeat = options.repeat or (3 if options.quick else 9)
     rows = []
     with tempfile.TemporaryDirectory(prefix="voxloom-bench-") as folder:
         drawer = pictures.Drawer(options.build, folder)
@@ -190,7 +202,7 @@ def main():
             for transfer in TRANSFERS:
                 for shaded in (False, True):
                     for size in sizes:
-                        measure(drawer, vtk, scene, source, transfer, shaded, size, repeat, rows)
+                        measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows)
     write_tables(rows, pathlib.Path(options.out))
 
 
