@@ -64,6 +64,8 @@ struct ValueDesc {
     std::variant<std::monostate, VolumeDesc, BricksDesc, ImageDesc,
                  std::shared_ptr<const SeriesDesc>, std::shared_ptr<const LatticeDesc>>
         detail;
+    // A volume that holds no voxels: they are read, decoded or computed where somebody asks for them.
+    bool by_region = false;
 
     ValueDesc() = default;
     ValueDesc(PortType t) : type(t) {}

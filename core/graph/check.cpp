@@ -616,6 +616,7 @@ class Checker {
 
     // In double: sizes that overflow 64 bits are just as much too large.
     static double memory_of(const ValueDesc& desc) {
+        if (desc.by_region) return 0;
         if (auto* image = std::get_if<ImageDesc>(&desc.detail))
             return double(image->size.x) * double(image->size.y) * 16;
         if (auto* bricks = std::get_if<BricksDesc>(&desc.detail))

@@ -77,7 +77,9 @@ void describe_decode(Description& d) {
                   "region");
         return;
     }
-    d.output("volume", region_desc(*bricks, level, box));
+    ValueDesc volume(region_desc(*bricks, level, box));
+    volume.by_region = d.params().text("access") == "stream";
+    d.output("volume", std::move(volume));
 }
 
 void evaluate_decode(Evaluation& e) {

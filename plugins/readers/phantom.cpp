@@ -304,7 +304,9 @@ S. Marschner and R. Lobb, An evaluation of reconstruction filters for volume ren
     type.describe = [](Description& d) {
         try {
             Phantom phantom = phantom_of(d.params());
-            d.output("volume", phantom.grid.desc);
+            ValueDesc volume(phantom.grid.desc);
+            volume.by_region = true;
+            d.output("volume", std::move(volume));
         } catch (const Error& e) {
             d.problem(e.what());
         }

@@ -107,7 +107,12 @@ reported from its size before anything is read, or where it is compressed while 
 
 **When not.** For several times in one file or numbered files use `readers.series`.)";
     type.describe = [](Description& d) {
-        or_problem(d, [&] { d.output("volume", opened_volume(d.params())->desc); });
+        or_problem(d, [&] {
+            const VolumeFilePtr file = opened_volume(d.params());
+            ValueDesc volume(file->desc);
+            volume.by_region = file->volume(0)->reads_by_region();
+            d.output("volume", std::move(volume));
+        });
     };
     type.evaluate = [](Evaluation& e) {
         VolumeFilePtr file = opened_volume(e.params());

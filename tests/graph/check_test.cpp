@@ -290,6 +290,28 @@ TEST(Check, WarnsWhenTheMemoryWouldNotDo) {
                 ElementsAre());
 }
 
+TEST(Check, VolumesReadByRegionCostNoMemory) {
+    VolumeDesc large;
+    large.dims = {1000, 1000, 1000};
+    ValueDesc streamed(large);
+    streamed.by_region = true;
+    NodeType source;
+    source.id = "fake.streamed";
+    source.title = "Streamed";
+    source.doc = "A volume.";
+    source.outputs = {{"volume", PortType::volume, "A volume."}};
+    source.describe = [&](Description& d) { d.output("volume", streamed); };
+    source.evaluate = [](Evaluation&) {};
+    Registry registry;
+    registry.add(source);
+    CheckOptions options;
+    options.memory_limit = 1000;
+    const Document document = Document::parse("voxloom: 1\nnodes:\n- { id: a, type: fake.streamed }\n");
+    EXPECT_THAT(check(document.graph(), registry, options).warnings, ElementsAre());
+    streamed.by_region = false;
+    EXPECT_EQ(check(document.graph(), registry, options).warnings.size(), 1u);
+}
+
 TEST(Check, TakesTenThousandNodesInChainsAndFans) {
     std::string text = "voxloom: 1\nnodes:\n  - { id: n0, type: fake.source }\n";
     for (int i = 1; i < 10000; ++i)
