@@ -25,4 +25,14 @@ void write_text_file(const fs::path& file, const std::string& text) {
     if (error) fail("{}: cannot be written: {}", file.string(), error.message());
 }
 
+void require_writable(const fs::path& folder, std::string_view option) {
+    fs::path there = fs::absolute(folder.empty() ? fs::path(".") : folder);
+    while (!fs::exists(there) && there.has_parent_path() && there != there.parent_path()) there = there.parent_path();
+    if (!fs::is_directory(there))
+        fail("{} {}: {} is a file, not a folder; choose another place", option, folder.string(), there.string());
+    if (access(there.c_str(), W_OK | X_OK) != 0)
+        fail("{} {}: {} cannot be written to ({}); choose another place", option, folder.string(), there.string(),
+             std::error_code(errno, std::generic_category()).message());
+}
+
 }  // namespace voxloom::cli

@@ -2,10 +2,15 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace voxloom::cli {
 
 // Writes to a temporary name beside `file`, then renames; makes the folder. Throws Error.
 void write_text_file(const std::filesystem::path& file, const std::string& text);
+
+// Throws Error, naming `option`, where the folder neither takes files nor can be made: before an hour's
+// work, not after it.
+void require_writable(const std::filesystem::path& folder, std::string_view option);
 
 }  // namespace voxloom::cli

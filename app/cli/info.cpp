@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -124,9 +125,13 @@ void print_values(const Value& value, std::stop_token stop) {
 int info(const InfoArguments& arguments, std::stop_token stop) {
     const Registry& registry = load_registry();
     // Every node that opens a file is asked; the one whose check finds no problem knows the file.
+    // A volume is told as one, not as a series of one step.
+    std::vector<const NodeType*> openers;
+    for (const NodeType* type : registry.all())
+        if (opens_files(*type)) openers.push_back(type);
+    std::ranges::stable_partition(openers, [](const NodeType* type) { return type->outputs[0].types.has(PortType::volume); });
     std::string first_problem;
-    for (const NodeType* type : registry.all()) {
-        if (!opens_files(*type)) continue;
+    for (const NodeType* type : openers) {
         const Plan plan = plan_to_open(*type, arguments.file, registry);
         if (!plan.problems.empty()) {
             // The reader of single volumes has the most to say of what is wrong with a file.

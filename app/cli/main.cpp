@@ -3,12 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <thread>
 
 #include "app/cli/commands.h"
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace {
 
@@ -42,6 +44,16 @@ void watch_interrupts() {
             stop_source.request_stop();
         }
     }).detach();
+}
+
+// CLI11 would only say that the word was not expected.
+void require_command(const CLI::App& app, const std::string& word) {
+    if (word.empty() || word.starts_with("-")) return;
+    std::vector<std::string> known;
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) known.push_back(command->get_name());
+    if (std::ranges::find(known, word) == known.end())
+        throw CLI::ExtrasError(fmt::format("there is no command '{}'{}", word, did_you_mean(word, known)),
+                               CLI::ExitCodes::ExtrasError);
 }
 
 }  // namespace
@@ -139,6 +151,7 @@ int main(int argc, char** argv) {
     command->callback([&] { status = cli::decompress(decompress, stop_source.get_token()); });
 
     try {
+        require_command(app, argc > 1 ? argv[1] : "");
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
         return app.exit(e) == 0 ? 0 : 2;

@@ -169,6 +169,12 @@ int run(const Document& document, const RunArguments& arguments, std::stop_token
     for (const std::string& warning : plan.warnings) fmt::print(stderr, "warning: {}\n", warning);
     select_outputs(plan, arguments.outputs);
     const std::vector<Saver> savers = add_savers(plan, registry);
+    const bool writes = std::ranges::any_of(plan.wanted, [&](const Plan::Source& wanted) {
+        const NodeType* type = plan.nodes[std::size_t(wanted.node)].type;
+        return type && type->writes_files;
+    });
+    if (writes) require_writable(arguments.out, "--out");
+    if (!arguments.report.empty()) require_writable(arguments.report.parent_path(), "--report");
 
     ResultCache cache(std::uint64_t(arguments.cache_gib * double(1 << 30)));
     RunOptions options;

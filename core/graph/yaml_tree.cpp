@@ -37,6 +37,16 @@ std::size_t skip_blank(std::string_view text, std::size_t position) {
     return position;
 }
 
+// The first tab before the text of the line that holds `position`; the text's size when there is none.
+static std::size_t tab_in_indentation(std::string_view text, std::size_t position) {
+    const std::size_t before = position == 0 ? std::string_view::npos : text.rfind('\n', position - 1);
+    for (std::size_t i = before == std::string_view::npos ? 0 : before + 1; i < text.size(); ++i) {
+        if (text[i] == '\t') return i;
+        if (text[i] != ' ') break;
+    }
+    return text.size();
+}
+
 std::size_t find_invalid_utf8(std::string_view text) {
     auto byte = [&](std::size_t i) {
         return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
@@ -391,8 +401,11 @@ YamlNode parse_yaml(const std::string& text, std::vector<Problem>& problems) {
     } catch (const Refused& refused) {
         return refuse(refused.position, refused.message);
     } catch (const YAML::Exception& e) {
-        std::size_t offset = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
-        return refuse(std::size_t(std::max(e.mark.pos, 0)) + offset, "this is not YAML: " + e.msg);
+        const std::size_t offset = text.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0;
+        const std::size_t position = std::min(std::size_t(std::max(e.mark.pos, 0)) + offset, text.size());
+        if (const std::size_t tab = tab_in_indentation(text, position); tab < text.size())
+            return refuse(tab, "this is not YAML: lines are indented with spaces, and here is a tab");
+        return refuse(position, "this is not YAML: " + e.msg);
     }
     return std::move(builder.root);
 }

@@ -1,6 +1,7 @@
 #include "core/plugin/loader.h"
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -24,7 +25,9 @@ std::vector<fs::path> plugin_search_path() {
     }
     std::error_code ignored;
     fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-    if (!ignored) folders.push_back(program.parent_path().parent_path() / "lib/voxloom/plugins");
+    // Who names folders may do without the program's own.
+    const fs::path own = program.parent_path().parent_path() / "lib/voxloom/plugins";
+    if (!ignored && (folders.empty() || fs::is_directory(own, ignored))) folders.push_back(own);
     return folders;
 }
 
@@ -60,9 +63,12 @@ LoadReport load_plugins(Registry& registry, const std::vector<fs::path>& folders
     std::set<fs::path> seen;
     for (const fs::path& folder : folders) {
         std::vector<fs::path> files;
-        std::error_code ignored;
-        for (const auto& entry : fs::directory_iterator(folder, ignored))
+        std::error_code error;
+        for (const auto& entry : fs::directory_iterator(folder, error))
             if (entry.path().extension() == ".so") files.push_back(entry.path());
+        if (error)
+            report.problems.push_back(fmt::format("{}: this folder of plugins cannot be read ({}); correct "
+                                                  "VOXLOOM_PLUGIN_PATH", folder.string(), error.message()));
         std::sort(files.begin(), files.end());
         for (const fs::path& file : files) {
             if (!seen.insert(file.filename()).second) continue;

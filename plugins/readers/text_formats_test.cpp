@@ -226,6 +226,15 @@ TEST(Nrrd, MembersOfAGzipStreamFollowOneAnother) {
     EXPECT_EQ(samples(path), ramp(300));
 }
 
+TEST(Nrrd, SizesThatAreNoneAreNamed) {
+    TempFolder folder;
+    const fs::path path = folder.path() / "odd.nrrd";
+    for (const char* sizes : {"4 -4 4", "4 0 4", "4 4.5 4", "4 x 4", "18446744073709551615 1 1", "4000000000 4000000000 4000000000"}) {
+        write_file(path, nrrd<double>(sizes, "encoding: raw\n", ramp(8)));
+        EXPECT_NE(complaint(path).find(fmt::format("sizes: {}", sizes)), std::string::npos) << complaint(path);
+    }
+}
+
 TEST(Nrrd, SizesThatOverflowOrPromiseMoreThanThereIsAreRefusedWithoutReading) {
     TempFolder folder;
     const fs::path path = folder.path() / "huge.nrrd";

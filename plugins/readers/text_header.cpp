@@ -135,6 +135,16 @@ NrrdHeader parse_nrrd_header(std::string_view head, const fs::path& path) {
     for (const char* field : {"type", "dimension", "sizes", "encoding"})
         if (!header.fields.contains(field))
             fail("{}: the NRRD header has no '{}'; it is cut short or damaged", path.string(), field);
+    double voxels = 1;
+    for (const std::string& size : split_words(get(header.fields, "sizes"))) {
+        std::int64_t n = 0;
+        if (!parse_integer(size, n) || n < 1)
+            fail("{}: the NRRD header says 'sizes: {}'; every size is a whole number of at least 1", path.string(),
+                 get(header.fields, "sizes"));
+        voxels *= double(n);
+    }
+    if (voxels > 9e18)
+        fail("{}: the NRRD header says 'sizes: {}', more voxels than any file holds", path.string(), get(header.fields, "sizes"));
     // A detached header may end with the file; an attached one ends with a blank line.
     if (!complete && !header.fields.contains("datafile"))
         fail("{}: the NRRD header is cut short: no blank line ends it and no data file is named",

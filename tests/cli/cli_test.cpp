@@ -62,6 +62,23 @@ TEST_F(Cli, aWrongOptionIsAUsageError) {
     EXPECT_EQ(run("").status, 2);
 }
 
+TEST_F(Cli, aMisspeltCommandIsToldTheNearest) {
+    Ran r = run("chek g.yaml");
+    EXPECT_EQ(r.status, 2);
+    EXPECT_THAT(r.err, AllOf(HasSubstr("'chek'"), HasSubstr("did you mean 'check'?")));
+}
+
+TEST_F(Cli, aPlaceThatTakesNoFilesIsRefusedBeforeAnythingRuns) {
+    write("g.yaml", "voxloom: 1\nnodes:\n  - { id: p, type: readers.phantom, set: { dims: [4, 4, 4] } }\n");
+    write("taken", "a file");
+    for (const char* place : {"--out taken/deep", "--report taken/report.json"}) {
+        Ran r = run(std::string("run g.yaml ") + place);
+        EXPECT_EQ(r.status, 1) << place;
+        EXPECT_THAT(r.err, AllOf(HasSubstr("choose another place"), Not(HasSubstr("node")))) << place;
+        EXPECT_THAT(r.out, IsEmpty()) << place;
+    }
+}
+
 TEST_F(Cli, aMissingGraphIsOneSentence) {
     Ran r = run("run nowhere.yaml");
     EXPECT_EQ(r.status, 1);

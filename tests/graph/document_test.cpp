@@ -31,6 +31,11 @@ std::string refusal_of(const std::string& text) {
     return "";
 }
 
+TEST(Document, aTabInTheIndentationIsNamed) {
+    EXPECT_THAT(refusal_of("voxloom: 1\nnodes:\n  - id: a\n\ttype: b\n"), StartsWith("g.yaml:4:1: "));
+    EXPECT_THAT(refusal_of("voxloom: 1\nnodes:\n  - id: a\n\ttype: b\n"), HasSubstr("here is a tab"));
+}
+
 template <class F>
 std::string error_of(F&& f) {
     try {

@@ -80,7 +80,9 @@ TEST(Loader, anEarlierFolderOverridesALaterOneAndTheRestGoesOn) {
     LoadReport report = load_plugins(registry, {a.path(), b.path(), "/no/such/folder"});
     ASSERT_EQ(report.loaded.size(), 1u);
     EXPECT_EQ(report.loaded[0].file, a.path() / "p.so");
-    EXPECT_EQ(report.problems.size(), 1u);
+    ASSERT_EQ(report.problems.size(), 2u);
+    EXPECT_THAT(report.problems[0], HasSubstr("old.so"));
+    EXPECT_THAT(report.problems[1], AllOf(HasSubstr("/no/such/folder"), HasSubstr("VOXLOOM_PLUGIN_PATH")));
 }
 
 TEST(Loader, searchesTheFoldersOfTheEnvironmentFirst) {
