@@ -58,6 +58,7 @@ struct CompressArguments {
     std::string coder;                       // empty: the codec's own choice
     std::string faces;                       // empty: the codec's own choice
     int brick = 0;                           // 0: the codec's own choice
+    std::uint64_t memory = 0;                // bytes; 0: the codec's own choice
     bool json = false;
     bool quiet = false;
 };

@@ -52,6 +52,7 @@ int compress(const CompressArguments& arguments, std::stop_token stop) {
     if (!arguments.coder.empty()) set += ", coder: " + to_yaml(arguments.coder);
     if (!arguments.faces.empty()) set += ", faces: " + to_yaml(arguments.faces);
     if (arguments.brick > 0) set += fmt::format(", brick: {}", to_yaml(std::to_string(arguments.brick)));
+    if (arguments.memory > 0) set += fmt::format(", memory: {}", to_yaml(double(arguments.memory) / (1 << 20)));
     return run_text(fmt::format("voxloom: 1\n"
                                 "nodes:\n"
                                 "  - {{ id: read, type: readers.volume, set: {{ path: {} }} }}\n"

@@ -119,6 +119,8 @@ int main(int argc, char** argv) {
     command->add_option("--coder", compress.coder, "The codec's entropy coder, such as dense or fast");
     command->add_option("--brick", compress.brick, "Voxels of a brick along each axis");
     command->add_option("--faces", compress.faces, "How neighbouring bricks meet, such as block or shared");
+    command->add_option("--memory", compress.memory, "Memory that encoding may take, such as 500M or 2G")
+        ->transform(CLI::AsSizeValue(false));
     CLI::Option_group* target = command->add_option_group("target", "What to reach; without, nothing is lost");
     target->require_option(0, 1);
     target->add_flag_callback("--lossless", [&] { compress.target = "lossless"; }, "Every bit comes back");

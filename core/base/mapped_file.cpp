@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -29,8 +30,22 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
     size_ = std::size_t(status.st_size);
 }
 
+MappedFile::MappedFile(int descriptor, std::uint64_t size, const std::string& name) {
+    if (size == 0) return;  // nothing cannot be mapped
+    void* memory = ::mmap(nullptr, std::size_t(size), PROT_READ, MAP_SHARED, descriptor, 0);
+    if (memory == MAP_FAILED) fail("{}: cannot be mapped ({})", name, std::strerror(errno));
+    data_ = static_cast<const std::byte*>(memory);
+    size_ = std::size_t(size);
+}
+
 MappedFile::~MappedFile() {
     if (data_) ::munmap(const_cast<std::byte*>(data_), size_);
+}
+
+void MappedFile::forget(std::uint64_t offset, std::uint64_t size) const {
+    const auto page = std::uint64_t(::sysconf(_SC_PAGESIZE));
+    const std::uint64_t first = (offset + page - 1) / page * page, last = std::min<std::uint64_t>(offset + size, size_);
+    if (first < last) ::madvise(const_cast<std::byte*>(data_) + first, std::size_t(last - first), MADV_DONTNEED);
 }
 
 }  // namespace voxloom

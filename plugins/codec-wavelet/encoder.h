@@ -18,7 +18,8 @@ struct EncodeOptions {
     int brick = 16;
     Rounding rounding = Rounding::unbiased;
     Faces faces = Faces::block;
-    std::string source;  // for the provenance
+    std::uint64_t memory = 0;  // bytes that the encoder may take beside the volume's own; 0: a quarter of the machine's
+    std::string source;        // for the provenance
 };
 
 struct EncodeReport {
@@ -28,9 +29,11 @@ struct EncodeReport {
     int rounds = 0;                            // of the search for the step
 };
 
-// Same volume and options, same bytes, whatever the threads. The volume is read twice or more, in boxes;
-// beside it, all coarser levels are held twice as 32-bit integers (2/7 of the voxels) and the
-// compressed bytes. Throws Error for what cannot be encoded, Cancelled when asked to stop.
+// Same volume and options, same bytes, whatever the threads and the memory. The volume is read slab by slab, once
+// for the levels and once for every step that is tried on all of it; floats and 32-bit integers whose range
+// is not known once more. What goes beyond options.memory, coarse levels and compressed bytes, waits in temporary
+// files without a name. `progress` may be called from any thread. Throws Error for what cannot be
+// encoded, when the disk is full, or when the memory cannot do; Cancelled when asked to stop.
 std::shared_ptr<const WaveletBricks> encode(const Volume& volume, const EncodeOptions& options, EncodeReport& report,
                                             const std::stop_token& stop = {},
                                             const std::function<void(double)>& progress = {});

@@ -1,13 +1,7 @@
 #include "plugins/codec-wavelet/file_format.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 
@@ -16,6 +10,7 @@
 #include "core/base/output_file.h"
 #include "plugins/codec-wavelet/adaptive_number.h"
 #include "plugins/codec-wavelet/byte_io.h"
+#include "plugins/codec-wavelet/passes.h"
 
 namespace voxloom::wavelet {
 
@@ -269,15 +264,10 @@ TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload, std:
         }
         index.infos[std::size_t(l)].resize(std::size_t(grid_count(tree.bricks.levels[std::size_t(l)].bricks)));
         for (std::size_t i = 0; i < families.size(); ++i) {
-            const glm::i64vec3 n(families_of(tree, l));
-            const glm::ivec3 at(std::int64_t(i) % n.x, std::int64_t(i) / n.x % n.y, std::int64_t(i) / (n.x * n.y));
-            const auto bricks = l == tree.top() ? std::vector<BrickId>{{l, at}} : tree.bricks.finer({l + 1, at});
-            const glm::i64vec3 grid(tree.bricks.levels[std::size_t(l)].bricks);
-            for (std::size_t b = 0; b < bricks.size(); ++b) {
-                const glm::i64vec3 place(bricks[b].index);
-                index.infos[std::size_t(l)][std::size_t((place.z * grid.y + place.y) * grid.x + place.x)].compressed_bytes =
-                    families[i].size / bricks.size() + (b < families[i].size % bricks.size());
-            }
+            const auto bricks = bricks_of(tree, family_at(tree, l, std::int64_t(i)));
+            for (std::size_t b = 0; b < bricks.size(); ++b)
+                index.infos[std::size_t(l)][place_of(tree.bricks, bricks[b])].compressed_bytes =
+                    share_of(families[i].size, b, bricks.size());
         }
     }
     if (offset != payload) fail("its index does not cover its data");
@@ -318,27 +308,24 @@ Bytes head_of(const TreeIndex& index, std::uint64_t payload) {
 
 std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload) { return head_of(index, payload).size() + payload; }
 
-std::uint64_t index_memory(const TreeIndex& index) {
-    std::uint64_t bytes = 0;
-    for (const auto& level : index.families) bytes += level.size() * sizeof(FamilyPlace);
-    for (const auto& level : index.infos) bytes += level.size() * sizeof(BrickInfo);
-    return bytes;
-}
-
 void write_file(const WaveletBricks& bricks, const std::filesystem::path& path, const std::stop_token& stop) {
+    constexpr std::size_t most = 8 << 20;
     OutputFile file(path);
     file.write(head_of(bricks.index(), bricks.payload().size()));
-    for (auto rest = bricks.payload(); !rest.empty();) {
+    const auto all = bricks.payload();
+    for (std::size_t at = 0; at < all.size(); at += most) {
         check_stop(stop);
-        const auto part = rest.first(std::min<std::size_t>(rest.size(), 8 << 20));
+        const auto part = all.subspan(at, std::min(all.size() - at, most));
         file.write(part);
-        rest = rest.subspan(part.size());
+        bricks.forget(at, part.size());
     }
     file.commit();
 }
 
-std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes, std::shared_ptr<const void> keeper,
-                                                const std::string& name) {
+namespace {
+
+std::shared_ptr<const WaveletBricks> open(std::span<const std::byte> bytes, std::shared_ptr<const void> keeper,
+                                          const MappedFile* file, const std::string& name) {
     try {
         if (bytes.size() < kPreamble || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
             fail("it does not begin like one");
@@ -356,34 +343,23 @@ std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes
         if (hasher.finish().lo != hash) fail("its head's checksum is wrong");
         TreeIndex index = read_head(head, payload, version);
         index.tree.bricks.compressed_bytes = bytes.size();
-        const std::uint64_t resident = index_memory(index);
-        return std::make_shared<WaveletBricks>(std::move(index), r.bytes(payload), std::move(keeper), resident);
+        return std::make_shared<WaveletBricks>(std::move(index),
+                                               Payload{r.bytes(payload), std::move(keeper), 0, file, kPreamble + head_size});
     } catch (const Error& e) {
         fail("{} is not a wavelet file that can be read: {}; get the file again", name, e.what());
     }
 }
 
+}  // namespace
+
+std::shared_ptr<const WaveletBricks> open_bytes(std::span<const std::byte> bytes, std::shared_ptr<const void> keeper,
+                                                const std::string& name) {
+    return open(bytes, std::move(keeper), nullptr, name);
+}
+
 std::shared_ptr<const WaveletBricks> open_file(const std::filesystem::path& path) {
-    struct Mapped {
-        void* data = MAP_FAILED;
-        std::size_t size = 0;
-        int descriptor = -1;
-        ~Mapped() {
-            if (data != MAP_FAILED) ::munmap(data, size);
-            if (descriptor >= 0) ::close(descriptor);
-        }
-    };
-    auto file = std::make_shared<Mapped>();
-    file->descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-    struct stat status {};
-    if (file->descriptor < 0 || ::fstat(file->descriptor, &status) != 0)
-        fail("{}: cannot be opened ({})", path.string(), std::strerror(errno));
-    if (!S_ISREG(status.st_mode)) fail("{}: is not a file", path.string());
-    file->size = std::size_t(status.st_size);
-    if (file->size > 0) file->data = ::mmap(nullptr, file->size, PROT_READ, MAP_PRIVATE, file->descriptor, 0);
-    if (file->size > 0 && file->data == MAP_FAILED) fail("{}: cannot be mapped ({})", path.string(), std::strerror(errno));
-    const std::span bytes(static_cast<const std::byte*>(file->data), file->size);
-    return open_bytes(bytes, file, path.string());
+    const auto file = std::make_shared<const MappedFile>(path);
+    return open(file->bytes(), file, file.get(), path.string());
 }
 
 }  // namespace voxloom::wavelet

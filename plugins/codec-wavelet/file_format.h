@@ -13,7 +13,6 @@ inline constexpr std::uint32_t kFileVersion = 2;  // what is written; 1 is read,
 
 // Bytes that a file with this index and so long a payload has.
 std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload);
-std::uint64_t index_memory(const TreeIndex& index);
 
 // Under a temporary name, then renamed. Throws Error when the disk refuses it.
 void write_file(const WaveletBricks& bricks, const std::filesystem::path& path, const std::stop_token& stop = {});

@@ -1,9 +1,7 @@
-// Integers of one level, a plane for each component, written and read in boxes.
+// Integers of one level, stored brick by brick, so that a family's are few long runs even in a file.
 #pragma once
 
-#include <vector>
-
-#include "core/base/buffer.h"
+#include "plugins/codec-wavelet/byte_store.h"
 #include "plugins/codec-wavelet/tree.h"
 
 namespace voxloom::wavelet {
@@ -11,30 +9,25 @@ namespace voxloom::wavelet {
 class LevelStore {
   public:
     LevelStore() = default;
-    LevelStore(Index3 dims, int components) : dims_(dims) {
-        for (int c = 0; c < components; ++c)
-            planes_.emplace_back(checked_product(dims, sizeof(std::int32_t), "a level of the tree"), "a level of the tree");
-    }
-    Index3 dims() const { return dims_; }
-    const std::int32_t* plane(std::size_t component) const { return planes_[component].as<std::int32_t>().data(); }
+    LevelStore(const TreeDesc& tree, int level, bool in_memory);
+    // What the store of a level takes.
+    static std::uint64_t bytes(const TreeDesc& tree, int level);
 
-    // The part `box` of values that fill `values_box`. Disjoint boxes may be written from several threads.
-    void write(const Box& box, const FamilyCodec::Planes& values, const Box& values_box) {
-        for (std::size_t c = 0; c < planes_.size(); ++c)
-            copy_box(box, reinterpret_cast<const std::byte*>(values[c].data()), values_box, planes_[c].data(),
-                     Box::of(dims_), sizeof(std::int32_t));
-    }
-    FamilyCodec::Planes read(const Box& box) const {
-        FamilyCodec::Planes values(planes_.size(), std::vector<std::int32_t>(box.voxels()));
-        for (std::size_t c = 0; c < planes_.size(); ++c)
-            copy_box(box, planes_[c].data(), Box::of(dims_), reinterpret_cast<std::byte*>(values[c].data()), box,
-                     sizeof(std::int32_t));
-        return values;
-    }
+    // The part `box` of planes that fill `values_box`; a store in a file takes whole bricks. Disjoint boxes may be
+    // written from several threads.
+    void write(const Box& box, const FamilyCodec::Planes& values, const Box& values_box);
+    FamilyCodec::Planes read(const Box& box) const;
+    // Of one component, to a dense array over `box`.
+    void read(const Box& box, int component, std::int32_t* out) const;
 
   private:
-    Index3 dims_{0};
-    std::vector<Buffer> planes_;
+    std::uint64_t place(Index3 brick, int component) const;
+    template <class Use>
+    void each_brick(const Box& box, const Use& use) const;
+
+    Index3 dims_{0}, brick_{1}, grid_{0};
+    int components_ = 1;
+    ByteStore store_;
 };
 
 }  // namespace voxloom::wavelet

@@ -188,7 +188,7 @@ void FamilyCodec::rebuild(Details& d) const {
     put_low(d.low, d.shape, d.q);
 }
 
-void FamilyCodec::encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out) const {
+void FamilyCodec::encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out, After after) const {
     ByteWriter writer(out);
     Bytes part;
     if (family.level == tree_.top()) {
@@ -200,7 +200,7 @@ void FamilyCodec::encode(FamilyId family, const Planes& low, Planes& planes, Byt
         part.clear();
         coder_.encode(d, part);
         writer.block(part);
-    });
+    }, after);
 }
 
 void FamilyCodec::decode(FamilyId family, const Planes& low, ByteReader& in, Planes& planes) const {

@@ -81,10 +81,11 @@ class FamilyCodec {
     // Transforms, quantises and restores: `planes` hold the samples of the family's box and become what the
     // decoder will get. `low` are the decoded parent's, empty for the root. `use` sees each plane's
     // details (not the root's).
+    enum class After { restored, spoiled };  // spoiled saves the way back, where nobody looks at `planes` again
     template <class Use>
-    void restore(FamilyId family, const Planes& low, Planes& planes, const Use& use) const;
+    void restore(FamilyId family, const Planes& low, Planes& planes, const Use& use, After after = After::restored) const;
     // The same, and appends the coder's bytes.
-    void encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out) const;
+    void encode(FamilyId family, const Planes& low, Planes& planes, Bytes& out, After after = After::restored) const;
 
     // --- decoder ---
     // Bytes of the coder's part are taken off `in`.
@@ -118,7 +119,7 @@ inline constexpr double kCentreOne = (kDeadZone + 2 - kRoundUp) / 2 - 1 - 0.12; 
 inline constexpr double kCentreMore = 0.5 - kRoundUp - 0.04;
 
 template <class Use>
-void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, const Use& use) const {
+void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, const Use& use, After after) const {
     Bytes nothing;
     for (std::size_t c = 0; c < planes.size(); ++c) {
         if (family.level == tree_.top()) {
@@ -131,6 +132,7 @@ void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, co
         split_family(d.q, d.shape, tree_.rounding, scratch);
         quantise(d);
         use(d);
+        if (after == After::spoiled) continue;
         rebuild(d);
         join_family(d.q, d.shape, tree_.rounding, scratch);
     }

@@ -7,6 +7,7 @@
 #include "core/data/convert.h"
 #include "plugins/codec-wavelet/byte_io.h"
 #include "plugins/codec-wavelet/exact_layer.h"
+#include "plugins/codec-wavelet/passes.h"
 
 namespace voxloom::wavelet {
 
@@ -60,10 +61,15 @@ Buffer tree_voxels(const TreeDesc& tree, const FamilyCodec::Planes& planes, std:
 
 std::uint32_t check_of(std::span<const std::byte> bytes) { return std::uint32_t(hash_bytes(bytes).lo); }
 
-WaveletBricks::WaveletBricks(TreeIndex index, std::span<const std::byte> payload,
-                             std::shared_ptr<const void> keeper, std::uint64_t resident)
-    : Bricks(index.tree.bricks), index_(std::move(index)), payload_(payload), keeper_(std::move(keeper)),
-      resident_(resident) {}
+WaveletBricks::WaveletBricks(TreeIndex index, Payload payload)
+    : Bricks(index.tree.bricks), index_(std::move(index)), payload_(std::move(payload)) {}
+
+std::uint64_t WaveletBricks::resident_bytes() const {
+    std::uint64_t sum = payload_.resident;
+    for (const auto& families : index_.families) sum += families.size() * sizeof(FamilyPlace);
+    for (const auto& infos : index_.infos) sum += infos.size() * sizeof(BrickInfo);
+    return sum;
+}
 
 BrickInfo WaveletBricks::info(BrickId id) const {
     assert(desc().has(id));
@@ -71,15 +77,10 @@ BrickInfo WaveletBricks::info(BrickId id) const {
     return index_.infos[level][place_in(desc().levels[level].bricks, id.index)];
 }
 
-std::vector<BrickId> WaveletBricks::bricks_of(FamilyId family) const {
-    if (family.level == index_.tree.top()) return {{family.level, family.index}};
-    return desc().finer({family.level + 1, family.index});
-}
-
 std::uint64_t WaveletBricks::family_bytes(BrickId id) const {
     const FamilyId family = family_of(index_.tree, id);
     std::uint64_t voxels = 0;
-    for (const BrickId& brick : bricks_of(family)) voxels += stored_box(index_.tree, brick).voxels();
+    for (const BrickId& brick : bricks_of(index_.tree, family)) voxels += stored_box(index_.tree, brick).voxels();
     const bool state = index_.tree.has_state() && id.level > 0;
     return voxels * (desc().tree_voxel_bytes() + (state ? sizeof(std::int32_t) * std::uint64_t(desc().volume.components) : 0));
 }
@@ -102,7 +103,7 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     try {
         const FamilyPlace& place = index_.families[std::size_t(id.level)]
                                                   [place_in(families_of(tree, id.level), family.index)];
-        const auto bytes = payload_.subspan(std::size_t(place.offset), std::size_t(place.size));
+        const auto bytes = payload_.bytes.subspan(std::size_t(place.offset), std::size_t(place.size));
         if (check_of(bytes) != place.check) fail("its checksum is wrong");
         FamilyCodec::Planes low;
         if (parent) low = parent_planes(tree, *parent);
@@ -129,7 +130,7 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     Buffer state;
     if (tree.has_state() && id.level > 0) state = interleaved<std::int32_t>(planes, count);
     std::vector<DecodedBrick> bricks;
-    for (const BrickId& child : bricks_of(family)) {
+    for (const BrickId& child : bricks_of(index_.tree, family)) {
         auto brick = std::make_shared<BrickVoxels>();
         const Box part = stored_box(tree, child);
         brick->stored = part.dims();

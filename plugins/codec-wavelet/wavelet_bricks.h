@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "plugins/codec-wavelet/payload.h"
 #include "plugins/codec-wavelet/tree.h"
 
 namespace voxloom::wavelet {
@@ -27,27 +28,23 @@ std::uint32_t check_of(std::span<const std::byte> bytes);
 
 class WaveletBricks final : public Bricks {
   public:
-    // `keeper` keeps the payload alive (a vector of bytes, a mapped file).
-    // `resident` is the memory that it takes.
-    WaveletBricks(TreeIndex index, std::span<const std::byte> payload, std::shared_ptr<const void> keeper,
-                  std::uint64_t resident);
+    WaveletBricks(TreeIndex index, Payload payload);
 
     BrickInfo info(BrickId id) const override;
     std::optional<BrickId> parent(BrickId id) const override { return desc().coarser(id); }
     std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const override;
     std::uint64_t family_bytes(BrickId id) const override;
-    std::uint64_t resident_bytes() const override { return resident_; }
+    std::uint64_t resident_bytes() const override;
 
     const TreeIndex& index() const { return index_; }
-    std::span<const std::byte> payload() const { return payload_; }
+    std::span<const std::byte> payload() const { return payload_.bytes; }
+    // Whoever walks through the whole payload gives it back piece by piece. Nothing happens to bytes in memory.
+    void forget(std::uint64_t offset, std::uint64_t size) const { payload_.forget(offset, size); }
 
   private:
-    std::vector<BrickId> bricks_of(FamilyId family) const;
 
     TreeIndex index_;
-    std::span<const std::byte> payload_;
-    std::shared_ptr<const void> keeper_;
-    std::uint64_t resident_;
+    Payload payload_;
 };
 
 }  // namespace voxloom::wavelet

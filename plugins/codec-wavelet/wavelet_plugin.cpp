@@ -4,6 +4,7 @@
 #include "core/plugin/plugin.h"
 #include "plugins/codec-wavelet/encoder.h"
 #include "plugins/codec-wavelet/file_format.h"
+#include "plugins/codec-wavelet/memory_plan.h"
 
 namespace voxloom::wavelet {
 
@@ -29,6 +30,7 @@ EncodeOptions options_of(const Params& params) {
     options.brick = std::stoi(params.text("brick"));
     options.faces = chosen<Faces>(params, "faces", kFaces);
     options.rounding = chosen<Rounding>(params, "rounding", kRoundings);
+    options.memory = std::uint64_t(params.real("memory") * 1024 * 1024);
     return options;
 }
 
@@ -60,6 +62,8 @@ std::vector<ParamSpec> encoding_params() {
             .in_group("Tree"),
         param::choice("rounding", kRoundings, "unbiased", "Rounding of the lifting: unbiased keeps the brightness of coarse levels.")
             .in_group("Tree").for_experts(),
+        param::real("memory", 0, "Memory that encoding may take beside the volume's own; what is more waits in temporary files. 0: a quarter of the machine's.")
+            .range(0, 1e9).slider(0, 4096).in_unit("MiB").changes(Affects::cost),
     };
 }
 
@@ -103,8 +107,10 @@ NodeType encode_node() {
             return;
         }
         node.output("bricks", plan(*volume, options_of(node.params())).bricks);
+        const std::uint64_t memory = options_of(node.params()).memory;
         const auto samples = double(volume->voxels()) * volume->components;
-        node.working_memory(std::uint64_t(samples * 2 * 4 / 7 + double(volume->dense_bytes())));
+        node.working_memory(std::min<std::uint64_t>(memory ? memory : default_memory(),
+                                                    std::uint64_t(samples * 2 * 4 / 7 + double(volume->dense_bytes()))));
     };
     type.evaluate = evaluate_encode;
     type.method = R"(**Method.** Cubes of (2k)^3 voxels are split by the integer 5/3 wavelet (Calderbank et al. 1998) into k^3
@@ -121,6 +127,9 @@ itself: absent details are then linear interpolation across faces, too, where `b
 
 `dense` codes with mixed adaptive contexts that start from a state learned once for the file; `paper` is the run-length and
 fixed Huffman code of the paper, `fast` static interleaved rANS over blocks of 4^3.
+
+The volume is read slab by slab. Coarse levels and compressed bytes that go beyond `memory` wait in temporary files
+($TMPDIR) without a name; the result does not depend on it.
 
 Floats pass through a 24-bit map of their range; `lossless` adds the exact distance of every voxel. NaN and infinities are kept
 in every mode; coarse levels show the last value before them.

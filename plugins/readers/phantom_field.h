@@ -10,6 +10,7 @@
 #include <span>
 
 #include "core/base/types.h"
+#include "core/base/wide.h"
 
 namespace voxloom {
 
@@ -102,15 +103,5 @@ inline double cos_turns(double t) {
 inline double sin_turns(double t) {
     return cos_turns(t - 0.25);
 }
-
-// Hot loops are compiled once more for wider registers. AVX2 without FMA: a fused multiply-add
-// would round differently and make the voxels depend on the machine. Sanitizers run before the
-// dynamic linker can choose.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define VOXLOOM_WIDE [[gnu::target_clones("avx2", "default")]]
-#else
-#define VOXLOOM_WIDE
-#endif
 
 }  // namespace voxloom

@@ -1,0 +1,229 @@
+#include "plugins/codec-wavelet/step_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/parallel.h"
+#include "plugins/codec-wavelet/emission.h"
+
+namespace voxloom::wavelet {
+
+namespace {
+
+// A tenth of what there is, within limits: enough for a ratio, which is what is asked of them.
+std::int64_t families_to_try(const TreeDesc& tree) {
+    return std::min(std::clamp<std::int64_t>(family_count(tree, 0) / 10, 32, 96), sample_size(tree));
+}
+
+constexpr double kLeast = 1e-300;
+
+}  // namespace
+
+StepSearch::StepSearch(Encoding& e, int& rounds) : e_(e), rounds_(rounds), counts_(e.tree) {
+    const TreeDesc& tree = e.tree;
+    const Selection& sample = e.sample.selection();
+    families_.resize(std::size_t(tree.top()) + 1);
+    const std::int64_t step = std::max<std::int64_t>(1, sample.count / families_to_try(tree));
+    for (std::int64_t i = (step - 1) / 2; i < sample.count; i += step) families_[0].push_back(sample.family(i));
+    for (int l = 0; l < tree.top(); ++l) {
+        auto& above = families_[std::size_t(l) + 1];
+        const glm::i64vec3 n(families_of(tree, l + 1));
+        for (const std::int64_t i : families_[std::size_t(l)]) {
+            const glm::i64vec3 parent(family_of(tree, {l + 1, family_at(tree, l, i).index}).index);
+            above.push_back((parent.z * n.y + parent.y) * n.x + parent.x);
+        }
+        std::sort(above.begin(), above.end());
+        above.erase(std::unique(above.begin(), above.end()), above.end());
+    }
+    const NoCoder none;
+    set_step(0);
+    std::vector<std::int32_t> scratch;
+    sweep(FamilyCodec(tree, none), [&](FamilyId family, const FamilyCodec::Planes&, FamilyCodec::Planes planes, const VoxelView&) {
+        if (family.level == tree.top()) return;
+        const Shape shape = shape_of(tree, family);
+        CoefficientCounts::Bands bands;
+        for (auto& plane : planes) {
+            split_family(plane.data(), shape, tree.rounding, scratch);
+            bands.add(shape, plane.data());
+        }
+        counts_.add(family.level, bands);
+    });
+}
+
+void StepSearch::set_step(double step) {
+    Quantiser& q = e_.tree.quantiser;
+    q = {};
+    if (step <= 0) return;
+    q.step = step;
+    q.centre_one = kCentreOne;
+    q.centre_more = kCentreMore;
+}
+
+// Top down, level by level: use(family, the restored parent's samples, its own integers, its voxels at level 0).
+template <class Use>
+void StepSearch::sweep(const FamilyCodec& codec, const Use& use) {
+    const TreeDesc& tree = e_.tree;
+    std::vector<FamilyCodec::Planes> above, here;
+    for (int l = tree.top(); l >= 0; --l) {
+        const auto& families = families_[std::size_t(l)];
+        here.assign(families.size(), {});
+        for (std::size_t k = 0; k < families.size(); ++k) {
+            check_stop(e_.stop);
+            const FamilyId family = family_at(tree, l, families[k]);
+            FamilyCodec::Planes low;
+            if (l < tree.top()) {
+                const Box parent = parent_box(tree, family);
+                const FamilyId owner = family_of(tree, {l + 1, family.index});
+                const auto& up = families_[std::size_t(l) + 1];
+                std::size_t at = 0;
+                while (family_at(tree, l + 1, up[at]).index != owner.index) ++at;
+                for (const auto& plane : above[at]) {
+                    low.emplace_back(parent.voxels());
+                    copy_box(parent, reinterpret_cast<const std::byte*>(plane.data()), box_of(tree, owner),
+                             reinterpret_cast<std::byte*>(low.back().data()), parent, sizeof(std::int32_t));
+                }
+            }
+            Buffer buffer;
+            VoxelView voxels;
+            FamilyCodec::Planes planes;
+            if (l == 0) {
+                voxels = e_.sample.get(tree, e_.sample.selection().slot(families[k]), buffer);
+                planes = integers_of(tree, voxels, family);
+            } else {
+                planes = e_.originals(family);
+                const std::int32_t half = shift_ > 0 ? 1 << (shift_ - 1) : 0;
+                if (shift_ > 0)
+                    for (auto& plane : planes)
+                        for (std::int32_t& v : plane) v = (v + half) >> shift_;
+            }
+            use(family, low, planes, voxels);
+            if (l == 0) continue;
+            if (!keeps_integers(tree)) codec.restore(family, low, planes, [](const Details&) {});
+            here[k] = std::move(planes);
+        }
+        above = std::move(here);
+        here.clear();
+    }
+}
+
+Estimate StepSearch::estimate(bool with_bytes) {
+    ++rounds_;
+    const TreeDesc& tree = e_.tree;
+    const NoCoder none;
+    const auto coder = with_bytes ? make_coder(e_.options.coder) : nullptr;
+    const FamilyCodec codec(tree, coder ? *coder : static_cast<const Coder&>(none));
+    if (with_bytes) {
+        if (families_to_learn_from(coder->kind()) > 0)
+            sweep(codec, [&](FamilyId family, const FamilyCodec::Planes& low, FamilyCodec::Planes planes, const VoxelView&) {
+                if (family.level < tree.top())
+                    codec.restore(family, low, planes, [&](const Details& d) { coder->train(d); }, FamilyCodec::After::spoiled);
+            });
+        coder->finish_training();
+    }
+    double squares = 0, bytes = with_bytes ? double(coder->tables().size()) : 0;
+    std::uint64_t finite = 0;
+    sweep(codec, [&](FamilyId family, const FamilyCodec::Planes& low, FamilyCodec::Planes planes, const VoxelView& voxels) {
+        std::size_t own = 0;
+        if (family.level > 0) {
+            if (!with_bytes) return;
+            Bytes out;
+            codec.encode(family, low, planes, out, FamilyCodec::After::spoiled);
+            own = out.size();
+        } else {
+            const EncodedFamily encoded = encode_fine(codec, tree, family, voxels, low, error_bound(e_.options), nullptr);
+            for (const MeasuredBrick& brick : encoded.bricks) {
+                squares += brick.squares;
+                finite += brick.finite;
+            }
+            own = encoded.bytes.size();
+        }
+        const auto l = std::size_t(family.level);
+        bytes += double(own) * double(family_count(tree, family.level)) / double(families_[l].size());
+    });
+
+    Estimate result{finite ? squares / double(finite) : 0, 0};
+    // What the sample is short of, or has too much of.
+    const auto ratio = [&](auto model) {
+        if (e_.counts.empty() || counts_.empty()) return 1.0;
+        const double all = (e_.counts.*model)(tree), some = (counts_.*model)(tree);
+        return all > 0 && some > 0 ? all / some : 1.0;
+    };
+    result.mse *= ratio(&CoefficientCounts::squares);
+    if (!with_bytes) return result;
+    double head = 512;  // lengths, checksums and statistics
+    for (int l = 0; l <= tree.top(); ++l)
+        head += 6.0 * double(family_count(tree, l)) + 6.0 * double(Box::of(Index3(tree.bricks.levels[std::size_t(l)].bricks)).voxels());
+    result.bytes = bytes * ratio(&CoefficientCounts::bits) + head;
+    return result;
+}
+
+double StepSearch::lossless_bytes() {
+    const Quantiser quantiser = std::exchange(e_.tree.quantiser, {});
+    const ValueMap map = std::exchange(e_.tree.map, map_of(e_.type(), e_.range(), 0));
+    shift_ = std::max(0, std::ilogb(e_.tree.map.step) - std::ilogb(map.step));
+    const double bytes = estimate(true).bytes;
+    shift_ = 0;
+    e_.tree.quantiser = quantiser;
+    e_.tree.map = map;
+    return bytes;
+}
+
+// False position on logarithms. measure() grows with the step, nearly `slope` times as fast.
+void StepSearch::find(double start, double goal, double slope, const std::function<double()>& measure) {
+    double step = std::max(1.0, start), finer = 0, coarser = 0, below = 0, above = 0;
+    for (int round = 0; round < 12; ++round) {
+        set_step(step);
+        const double off = measure() - goal;
+        if (std::abs(off) < 0.002 * slope || (off > 0 && step <= 1) || step > 1e12) return;
+        if (off < 0) {
+            finer = step;
+            below = off;
+        } else {
+            coarser = step;
+            above = off;
+        }
+        if (finer > 0 && coarser > 0) {
+            if (coarser / finer < 1.0005) return;
+            step = finer * std::pow(coarser / finer, std::clamp(below / (below - above), 0.05, 0.95));
+        } else {
+            step = std::max(1.0, step * std::exp(std::clamp(-off / slope, -2.0, 2.0)));
+        }
+    }
+}
+
+// The step at which the model of all details meets the goal. It is never asked of a voxel.
+double StepSearch::start_of(double goal, const std::function<double()>& model) {
+    double lo = 0, hi = std::log(double(1 << 26));
+    for (int i = 0; i < 30; ++i) {
+        const double middle = (lo + hi) / 2;
+        set_step(std::exp(middle));
+        (model() < goal ? lo : hi) = middle;
+    }
+    return std::exp((lo + hi) / 2);
+}
+
+void StepSearch::find_mse(double mse) {
+    const CoefficientCounts& counts = e_.counts.empty() ? counts_ : e_.counts;
+    const double unit = e_.tree.map.step * e_.tree.map.step;
+    double start = std::sqrt(12 * mse / unit);
+    if (!counts.empty()) start = start_of(mse, [&] { return counts.squares(e_.tree) * unit; });
+    find(start, std::log(std::max(mse, kLeast)), 1.6, [&] { return std::log(std::max(estimate(false).mse, kLeast)); });
+}
+
+void StepSearch::find_bytes(double bytes, double overhead) {
+    const CoefficientCounts& counts = e_.counts.empty() ? counts_ : e_.counts;
+    const double voxels = double(e_.tree.bricks.volume.voxels());
+    double start = std::max(1.0, e_.range().extent() / e_.tree.map.step / 64);
+    if (!counts.empty()) start = start_of(-bytes, [&] { return -counts.bits(e_.tree) * voxels / 8; });
+    find(start, -std::log(bytes), 0.8, [&] { return -std::log(estimate(true).bytes + overhead); });
+}
+
+void StepSearch::correct_mse(double got, double wanted) {
+    set_step(std::max(1.0, e_.tree.quantiser.step * std::pow(wanted / std::max(got, kLeast), 1 / 1.6)));
+}
+
+void StepSearch::correct_bytes(double got, double wanted) {
+    set_step(std::max(1.0, e_.tree.quantiser.step * std::pow(got / wanted, 1 / 0.8)));
+}
+
+}  // namespace voxloom::wavelet

@@ -1,0 +1,38 @@
+// Original voxels of a box, and the integers of the tree that they become.
+#pragma once
+
+#include <stop_token>
+
+#include "core/data/volume.h"
+#include "plugins/codec-wavelet/tree.h"
+
+namespace voxloom::wavelet {
+
+// Voxels in the order of `box`; those of a box inside are rows of it. Refers to memory of others.
+struct VoxelView {
+    Box box;
+    const std::byte* data = nullptr;
+    std::size_t voxel_bytes = 1;
+
+    const std::byte* row(std::int64_t x, std::int64_t y, std::int64_t z) const {
+        const Index3 n = box.dims();
+        return data + std::size_t(((z - box.lo.z) * n.y + y - box.lo.y) * n.x + x - box.lo.x) * voxel_bytes;
+    }
+};
+
+// A box of the volume: where that is in memory itself, else read into a buffer by all threads.
+class VoxelTile {
+  public:
+    VoxelTile(const Volume& volume, const Box& box, const std::stop_token& stop);
+    const VoxelView& view() const { return view_; }
+
+  private:
+    Buffer voxels_;
+    VoxelView view_;
+};
+
+// The tree's integers of a family of level 0. What is not finite is filled from what is near: a jump would
+// cost details. Shared faces are filled from what they hold themselves.
+FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, FamilyId family);
+
+}  // namespace voxloom::wavelet
