@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -203,11 +204,24 @@ void Document::add_node(const std::string& id, const std::string& type,
     apply(wanted);
 }
 
-void Document::remove_node(const std::string& id) {
+void Document::add_nodes(const std::vector<GraphNode>& nodes) {
     Graph wanted = graph_;
-    node_of(wanted, id);
-    auto of_node = [&](const WireEnd& end) { return end.node == id; };
-    std::erase_if(wanted.nodes, [&](const GraphNode& node) { return node.id == id; });
+    for (const GraphNode& node : nodes) {
+        require_name(node.id, "id for a node");
+        if (wanted.find(node.id)) fail("there is a node '{}' already; take another id", node.id);
+        wanted.nodes.push_back(node);
+    }
+    apply(wanted);
+}
+
+void Document::remove_node(const std::string& id) { remove_nodes({id}); }
+
+void Document::remove_nodes(const std::vector<std::string>& ids) {
+    Graph wanted = graph_;
+    for (const std::string& id : ids) node_of(wanted, id);
+    const std::set<std::string> gone(ids.begin(), ids.end());
+    auto of_node = [&](const WireEnd& end) { return gone.count(end.node) > 0; };
+    std::erase_if(wanted.nodes, [&](const GraphNode& node) { return gone.count(node.id) > 0; });
     std::erase_if(wanted.outputs, of_node);
     for (GraphNode& node : wanted.nodes)
         std::erase_if(node.inputs, [&](GraphInput& input) {
@@ -273,10 +287,14 @@ void Document::disconnect(const std::string& to_node, const std::string& to_port
     apply(wanted);
 }
 
-void Document::move_node(const std::string& id, glm::dvec2 at) {
-    require_place(id, at);
+void Document::move_node(const std::string& id, glm::dvec2 at) { move_nodes({{id, at}}); }
+
+void Document::move_nodes(const std::vector<std::pair<std::string, glm::dvec2>>& places) {
     Graph wanted = graph_;
-    node_of(wanted, id).at = at;
+    for (const auto& [id, at] : places) {
+        require_place(id, at);
+        node_of(wanted, id).at = at;
+    }
     apply(wanted);
 }
 

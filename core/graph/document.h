@@ -97,7 +97,10 @@ class Document {
     // already (a parameter that has the value, a port that has no wire) is no step at all.
     void add_node(const std::string& id, const std::string& type,
                   std::optional<glm::dvec2> at = std::nullopt);
+    // Nodes as they are, with parameters and wires; their ids must be free (what is pasted).
+    void add_nodes(const std::vector<GraphNode>& nodes);
     void remove_node(const std::string& id);                       // with its wires and outputs
+    void remove_nodes(const std::vector<std::string>& ids);
     void rename_node(const std::string& id, const std::string& to);  // wires and outputs follow
     void set_param(const std::string& id, const std::string& key, const ParamValue& value);
     void reset_param(const std::string& id, const std::string& key);
@@ -106,6 +109,7 @@ class Document {
                  const std::string& to_node, const std::string& to_port, bool append = false);
     void disconnect(const std::string& to_node, const std::string& to_port);
     void move_node(const std::string& id, glm::dvec2 at);
+    void move_nodes(const std::vector<std::pair<std::string, glm::dvec2>>& places);
     // Of node and port (empty: the node itself); an empty list removes the key.
     void set_outputs(const std::vector<std::pair<std::string, std::string>>& outputs);
 

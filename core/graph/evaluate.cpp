@@ -254,6 +254,7 @@ void Run::prepare() {
 
 RunResult Run::operator()() {
     const std::int64_t begin = wall_ns();
+    if (options_.observer) options_.observer->began(plan_);
     prepare();
     {
         std::unique_lock lock(mutex_);

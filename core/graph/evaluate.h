@@ -78,6 +78,8 @@ struct RunResult {
 // Called from any thread, one at a time.
 struct RunObserver {
     virtual ~RunObserver() = default;
+    // Before anything else of a run; the plan lives as long as the run does.
+    virtual void began(const Plan& /*plan*/) {}
     virtual void state_changed(int /*node*/, const NodeReport& /*report*/) {}
     // Fraction of the node, and the time that the slowest of the running nodes still needs at its
     // pace so far; negative while unknown.

@@ -179,35 +179,42 @@ class Patcher {
             replace_value(root_, list, "[]");
         else if (!removed.empty())
             remove_items(root_.items[std::size_t(list)], removed);
-        for (; k < to.size(); ++k) add_node(list, to[k], from.empty());
+        if (k == to.size()) return;
+        if (from.empty()) return add_first_nodes(list, to);
+        for (; k < to.size(); ++k) append_node(root_.items[std::size_t(list)], to[k]);
     }
 
-    void add_node(int list, const GraphNode& node, bool first) {
-        std::vector<std::string> lines = lines_of(node);
-        if (!first) {
-            const YamlNode& nodes = root_.items[std::size_t(list)];
-            if (nodes.flow)
-                append_item(nodes, "{ " + join(lines, ", ") + " }");
-            else
-                append_item(nodes, join(lines, newline_ + indent(column(nodes.begin) + 2)));
-        } else if (root_.flow) {
-            std::string item = "[{ " + join(lines, ", ") + " }]";
+    void append_node(const YamlNode& nodes, const GraphNode& node) {
+        if (nodes.flow)
+            append_item(nodes, "{ " + join(lines_of(node), ", ") + " }");
+        else
+            append_item(nodes, join(lines_of(node), newline_ + indent(column(nodes.begin) + 2)));
+    }
+
+    // Where the list is empty, or not there (-1).
+    void add_first_nodes(int list, const std::vector<GraphNode>& nodes) {
+        if (root_.flow) {
+            std::vector<std::string> items;
+            for (const GraphNode& node : nodes) items.push_back("{ " + join(lines_of(node), ", ") + " }");
+            std::string value = "[" + join(items, ", ") + "]";
             if (list < 0)
-                insert_entry(root_, int(root_.keys.size()) - 1, "nodes: " + item);
+                insert_entry(root_, int(root_.keys.size()) - 1, "nodes: " + value);
             else
-                replace_value(root_, list, item);
+                replace_value(root_, list, value);
         } else {
             std::size_t margin = column(root_.begin);
-            std::string item =
-                newline_ + indent(margin + 2) + "- " + join(lines, newline_ + indent(margin + 4));
+            std::string items;
+            for (const GraphNode& node : nodes)
+                items += newline_ + indent(margin + 2) + "- " +
+                         join(lines_of(node), newline_ + indent(margin + 4));
             if (list < 0) {
-                insert_entry(root_, int(root_.keys.size()) - 1, "nodes:" + item);
+                insert_entry(root_, int(root_.keys.size()) - 1, "nodes:" + items);
             } else {
                 // '[]', '~' or nothing goes, a comment behind it stays.
                 const YamlNode& value = root_.items[std::size_t(list)];
                 std::size_t colon = behind_colon(root_.keys[std::size_t(list)]);
                 patch(colon, value.end - colon, "");
-                patch(line_end(value.end), 0, item);
+                patch(line_end(value.end), 0, items);
             }
         }
     }

@@ -797,5 +797,29 @@ TEST(DocumentFile, WritesNumbersThatReadBackExactlyInEveryLocale) {
     if (c_locale) std::setlocale(LC_NUMERIC, "C");
 }
 
+TEST(Document, addsSeveralNodesAsTheyAreInOneStep) {
+    const Graph three = Document::parse(
+        "voxloom: 1\nnodes:\n  - { id: a, type: t.t, set: { n: 012, w: 'on' }, at: [1, 2] }\n"
+        "  - { id: b, type: t.t, in: { x: a.y, z: [a.y, c.y] } }\n  - { id: c, type: t.t }\n").graph();
+    for (const char* text : {"voxloom: 1\nnodes: []\n", "voxloom: 1\nnodes:  # none yet\n", "voxloom: 1\n",
+                             "{ voxloom: 1 }", "{ voxloom: 1, nodes: [] }",
+                             "voxloom: 1\nnodes:\n  - { id: z, type: t.t }\n", "{ voxloom: 1, nodes: [{ id: z, type: t.t }] }"}) {
+        Document document = Document::parse(text);
+        Graph wanted = document.graph();
+        wanted.nodes.insert(wanted.nodes.end(), three.nodes.begin(), three.nodes.end());
+        document.add_nodes(three.nodes);
+        EXPECT_TRUE(same_content(document.graph(), wanted)) << document.text();
+        const std::string before = document.text();
+        EXPECT_THAT(error_of([&] { document.add_nodes({three.nodes[1]}); }), HasSubstr("already"));
+        EXPECT_EQ(document.text(), before);
+        document.remove_nodes({"a", "c"});
+        EXPECT_EQ(document.graph().find("b")->inputs.size(), 0u);
+        document.undo();
+        document.undo();
+        EXPECT_EQ(document.text(), text);
+        EXPECT_FALSE(document.can_undo());
+    }
+}
+
 }  // namespace
 }  // namespace voxloom
