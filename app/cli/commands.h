@@ -72,4 +72,13 @@ struct DecompressArguments {
 };
 int decompress(const DecompressArguments& arguments, std::stop_token stop);
 
+struct EditArguments {
+    std::filesystem::path graph;             // empty: the start page
+    std::filesystem::path out = "out";
+    std::string size = "1600x960";           // of the window
+    double scale = 0;                        // 0: the screen's own
+    std::filesystem::path screen;            // where to write what is on the screen; empty: nowhere
+};
+int edit(const EditArguments& arguments);
+
 }  // namespace voxloom::cli

@@ -22,6 +22,7 @@ A graph is a YAML file of nodes: what reads, what compresses, what draws. Begin 
   voxloom run graphs/first-look.yaml --set ct.path=my.nrrd  ... on your own volume
   voxloom nodes                                           what there is to wire
   voxloom nodes slicer.render                             how to use one
+  voxloom edit graphs/first-look.yaml                     wire, tune and look in a window
   voxloom check graphs/first-look.yaml                    every problem, with its line
   voxloom info my.nrrd                                    what is in a file
   voxloom compress my.nrrd my.vxw --psnr 50               compress a volume; decompress undoes it
@@ -151,6 +152,17 @@ int main(int argc, char** argv) {
     command->add_flag("--quiet", decompress.quiet, "No progress");
     command->footer("Example: voxloom decompress head.vxw head.nrrd --level 1");
     command->callback([&] { status = cli::decompress(decompress, stop_source.get_token()); });
+
+    cli::EditArguments edit;
+    command = app.add_subcommand("edit", "Wire, tune and look at a graph in a window");
+    command->add_option("graph", edit.graph, "The graph (YAML); without, a page to start from");
+    command->add_option("--out", edit.out, "Folder for written files and screenshots")->capture_default_str();
+    command->add_option("--size", edit.size, "WIDTHxHEIGHT of the window")->capture_default_str();
+    command->add_option("--scale", edit.scale, "Pixels a unit of the interface; 0: the screen's own")
+        ->check(CLI::Range(0.0, 8.0))->capture_default_str();
+    command->add_option("--screen", edit.screen,
+                        "Write what is on the screen to this file (JSON) whenever it is drawn");
+    command->callback([&] { status = cli::edit(edit); });
 
     try {
         require_command(app, argc > 1 ? argv[1] : "");

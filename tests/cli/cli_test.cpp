@@ -53,8 +53,14 @@ TEST_F(Cli, helpTeachesWithExamples) {
     Ran r = run("--help");
     EXPECT_EQ(r.status, 0);
     EXPECT_THAT(r.out, AllOf(HasSubstr("voxloom run"), HasSubstr("--set"), HasSubstr("voxloom nodes")));
-    for (const char* command : {"run", "check", "nodes", "info", "compress", "decompress"})
+    for (const char* command : {"run", "check", "nodes", "info", "compress", "decompress", "edit"})
         EXPECT_EQ(run(std::string(command) + " --help").status, 0) << command;
+}
+
+TEST_F(Cli, anEditorWithoutADisplayIsOneSentence) {
+    Ran r = run("edit", "env -u DISPLAY -u WAYLAND_DISPLAY");
+    EXPECT_EQ(r.status, 1);
+    EXPECT_THAT(r.err, ContainsRegex("is there a display|without the editor"));
 }
 
 TEST_F(Cli, aWrongOptionIsAUsageError) {

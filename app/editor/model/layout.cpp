@@ -1,0 +1,117 @@
+#include "app/editor/model/layout.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace voxloom::editor {
+
+namespace {
+
+constexpr double kColumnGap = 70, kRowGap = 30;
+
+// Nodes that feed each node, as indices.
+std::vector<std::vector<std::size_t>> sources_of(const Graph& graph) {
+    std::map<std::string_view, std::size_t> index;
+    for (std::size_t i = 0; i < graph.nodes.size(); ++i) index.emplace(graph.nodes[i].id, i);
+    std::vector<std::vector<std::size_t>> sources(graph.nodes.size());
+    for (std::size_t i = 0; i < graph.nodes.size(); ++i)
+        for (const GraphInput& input : graph.nodes[i].inputs)
+            for (const WireEnd& end : input.from)
+                if (auto found = index.find(end.node); found != index.end() && found->second != i)
+                    sources[i].push_back(found->second);
+    return sources;
+}
+
+// The longest way from a node without sources. A cycle ends the search after as many rounds as there
+// are nodes, and keeps what it has.
+std::vector<int> columns_of(const std::vector<std::vector<std::size_t>>& sources) {
+    std::vector<int> column(sources.size());
+    bool changed = true;
+    for (std::size_t round = 0; changed && round < sources.size(); ++round) {
+        changed = false;
+        for (std::size_t i = 0; i < sources.size(); ++i)
+            for (std::size_t from : sources[i])
+                if (column[i] <= column[from] && column[from] + 1 < int(sources.size())) {
+                    column[i] = column[from] + 1;
+                    changed = true;
+                }
+    }
+    return column;
+}
+
+}  // namespace
+
+glm::dvec2 NodeBox::input(int i) const { return at + glm::dvec2(0, kHeaderHeight + (i + 0.5) * kRowHeight); }
+glm::dvec2 NodeBox::output(int i) const { return input(i) + glm::dvec2(size.x, 0); }
+bool NodeBox::contains(glm::dvec2 p) const { return overlaps(p, p); }
+bool NodeBox::overlaps(glm::dvec2 lo, glm::dvec2 hi) const {
+    return lo.x <= at.x + size.x && hi.x >= at.x && lo.y <= at.y + size.y && hi.y >= at.y;
+}
+
+glm::dvec2 node_size(const NodePorts& ports) {
+    const std::size_t rows = std::max(ports.inputs.size(), ports.outputs.size());
+    return {kNodeWidth, kHeaderHeight + double(rows) * kRowHeight + kFooterHeight};
+}
+
+glm::dvec2 snapped(glm::dvec2 at) { return glm::round(at / kSnap) * kSnap; }
+
+std::vector<NodeBox> boxes_of(const Graph& graph, const std::vector<NodePorts>& ports) {
+    std::vector<NodeBox> boxes(graph.nodes.size());
+    bool all_placed = true;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        boxes[i].size = node_size(ports[i]);
+        all_placed = all_placed && graph.nodes[i].at;
+    }
+    std::vector<glm::dvec2> made;
+    if (!all_placed) made = auto_layout(graph, ports);
+    for (std::size_t i = 0; i < boxes.size(); ++i) boxes[i].at = graph.nodes[i].at.value_or(made.empty() ? glm::dvec2(0.0) : made[i]);
+    return boxes;
+}
+
+std::vector<glm::dvec2> auto_layout(const Graph& graph, const std::vector<NodePorts>& ports) {
+    const auto sources = sources_of(graph);
+    const std::vector<int> column = columns_of(sources);
+    const std::size_t n = sources.size();
+    std::vector<std::vector<std::size_t>> columns;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (columns.size() <= std::size_t(column[i])) columns.resize(std::size_t(column[i]) + 1);
+        columns[std::size_t(column[i])].push_back(i);
+    }
+    std::vector<glm::dvec2> at(n, glm::dvec2(0.0));
+    // Each column is sorted by the mean height of what feeds it, which keeps most wires from crossing.
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        std::vector<double> pull(n, 0.0);
+        for (std::size_t i : columns[c]) {
+            for (std::size_t from : sources[i]) pull[i] += at[from].y;
+            if (!sources[i].empty()) pull[i] /= double(sources[i].size());
+        }
+        if (c > 0)
+            std::stable_sort(columns[c].begin(), columns[c].end(),
+                             [&](std::size_t a, std::size_t b) { return pull[a] < pull[b]; });
+        double height = -kRowGap;
+        for (std::size_t i : columns[c]) height += node_size(ports[i]).y + kRowGap;
+        double y = -height / 2;
+        for (std::size_t i : columns[c]) {
+            at[i] = snapped({double(c) * (kNodeWidth + kColumnGap), y});
+            y += node_size(ports[i]).y + kRowGap;
+        }
+    }
+    return at;
+}
+
+glm::dvec2 free_place(const std::vector<NodeBox>& boxes, glm::dvec2 wanted, glm::dvec2 size) {
+    glm::dvec2 at = snapped(wanted);
+    const glm::dvec2 gap(kSnap);
+    // Each round goes below a box that is in the way, so the rounds are no more than the boxes.
+    for (std::size_t round = 0; round <= boxes.size(); ++round) {
+        auto hit = std::find_if(boxes.begin(), boxes.end(),
+                                [&](const NodeBox& b) { return b.overlaps(at - gap, at + size + gap); });
+        if (hit == boxes.end()) break;
+        at.y = std::ceil((hit->at.y + hit->size.y + 2 * kSnap) / kSnap) * kSnap;
+    }
+    return at;
+}
+
+}  // namespace voxloom::editor

@@ -1,0 +1,181 @@
+#include "app/editor/view/actions.h"
+
+#include <GLFW/glfw3.h>
+#include <fmt/format.h>
+
+#include <cassert>
+
+namespace voxloom::editor {
+
+namespace {
+
+bool has_selection(const Editor& e) { return !e.work.selected.empty(); }
+bool has_nodes(const Editor& e) { return !e.work.graph().nodes.empty(); }
+
+void undo(Editor& e) {
+    close_drag_step(e);
+    e.work.document.undo();
+    forget_missing(e.work);
+    e.texts.clear();
+}
+
+void redo(Editor& e) {
+    close_drag_step(e);
+    e.work.document.redo();
+    forget_missing(e.work);
+    e.texts.clear();
+}
+
+void copy(Editor& e) {
+    e.copied = copy_selected(e.work, e.registry);
+    if (!e.copied.empty()) ImGui::SetClipboardText(e.copied.c_str());
+}
+
+glm::dvec2 pointer_on_canvas(const Editor& e) {
+    const glm::dvec2 p = e.canvas.to_canvas(vec(ImGui::GetMousePos()));
+    const glm::dvec2 hi = e.canvas.to_canvas(e.canvas.lo + e.canvas.size);
+    const bool inside = p.x >= e.canvas.pan.x && p.y >= e.canvas.pan.y && p.x <= hi.x && p.y <= hi.y;
+    return inside ? p : (e.canvas.pan + hi) * 0.5;
+}
+
+void paste_here(Editor& e) {
+    const char* clipboard = ImGui::GetClipboardText();
+    const std::string text = clipboard && *clipboard ? clipboard : e.copied;
+    edit(e, [&] { paste(e.work, e.registry, text, pointer_on_canvas(e)); });
+}
+
+void duplicate(Editor& e) {
+    const std::string text = copy_selected(e.work, e.registry);
+    edit(e, [&] { paste(e.work, e.registry, text, pointer_on_canvas(e)); });
+}
+
+void remove(Editor& e) { edit(e, [&] { remove_selected(e.work); }); }
+
+void cut(Editor& e) {
+    copy(e);
+    remove(e);
+}
+
+void select_all(Editor& e) {
+    for (const GraphNode& node : e.work.graph().nodes) e.work.selected.insert(node.id);
+}
+
+void rescale(Editor& e, double factor) {
+    e.settings.text_scale = std::min(std::max(e.settings.text_scale * factor, 0.5), 3.0);
+    e.theme_changed = true;
+}
+
+std::vector<Action> make_actions() {
+    using E = Editor;
+    return {
+        {"new", "File", "New", "Begins an empty graph.", GLFW_KEY_N, true, false,
+         [](E& e) { unless_changed(e, [&e] { new_graph(e); }); }},
+        {"open", "File", "Open", "Opens a graph from a file.", GLFW_KEY_O, true, false,
+         [](E& e) {
+             unless_changed(e, [&e] {
+                 open_file_dialog(e, FileDialog::Purpose::open_graph, e.work.file,
+                                  [&e](const std::filesystem::path& file) { open_graph(e, file); });
+             });
+         }},
+        {"save", "File", "Save", "Saves the graph to its file.", GLFW_KEY_S, true, false, [](E& e) { save(e); }},
+        {"save-as", "File", "Save as", "Saves the graph to another file.", GLFW_KEY_S, true, true,
+         [](E& e) { save_as(e); }},
+        {"quit", "File", "Quit", "Leaves the editor.", GLFW_KEY_Q, true, false,
+         [](E& e) { unless_changed(e, [&e] { e.quit = true; }); }},
+        {"undo", "Edit", "Undo", "Takes the last change back.", GLFW_KEY_Z, true, false, undo,
+         [](const E& e) { return e.work.document.can_undo(); }},
+        {"redo", "Edit", "Redo", "Makes the change again that was taken back.", GLFW_KEY_Y, true, false, redo,
+         [](const E& e) { return e.work.document.can_redo(); }},
+        {"cut", "Edit", "Cut", "Takes the selected nodes to the clipboard, as YAML.", GLFW_KEY_X, true, false, cut, has_selection},
+        {"copy", "Edit", "Copy", "Copies the selected nodes to the clipboard, as YAML.", GLFW_KEY_C, true, false, copy, has_selection},
+        {"paste", "Edit", "Paste", "Adds the nodes of the clipboard's YAML at the pointer.", GLFW_KEY_V, true, false, paste_here},
+        {"duplicate", "Edit", "Duplicate", "Adds a copy of the selected nodes at the pointer.", GLFW_KEY_D, true, false, duplicate, has_selection},
+        {"delete", "Edit", "Delete", "Removes the selected nodes and their wires.", GLFW_KEY_DELETE, false, false, remove, has_selection},
+        {"select-all", "Edit", "Select all", "Selects every node.", GLFW_KEY_A, true, false, select_all, has_nodes},
+        {"add", "Canvas", "Add node", "Finds a kind of node by a few letters and adds it.", GLFW_KEY_TAB, false, false,
+         [](E& e) { open_add_menu(e, pointer_on_canvas(e)); }},
+        {"fit", "Canvas", "Fit", "Shows the whole graph.", GLFW_KEY_F, false, false, [](E& e) { fit_canvas(e); }, has_nodes},
+        {"arrange", "Canvas", "Arrange", "Lays all nodes out anew, sources left and results right.", GLFW_KEY_L, false, false,
+         [](E& e) {
+             edit(e, [&e] { arrange(e.work, e.registry); });
+             fit_canvas(e);
+         }, has_nodes},
+        {"align", "Canvas", "Align", "Puts the selected nodes below each other.", GLFW_KEY_A, false, true,
+         [](E& e) { edit(e, [&e] { align_selected(e.work, e.registry); }); },
+         [](const E& e) { return e.work.selected.size() > 1; }},
+        {"write", "Run", "Write files", "Runs the nodes that write files; their files go to the output folder.", GLFW_KEY_F5, false, false,
+         [](E& e) { write_files(e); }, has_nodes},
+        {"stop", "Run", "Stop", "Stops what is running.", GLFW_KEY_ESCAPE, false, false,
+         [](E& e) { e.evaluator.cancel(); }, [](const E& e) { return e.live.busy; }},
+        {"fit-picture", "Picture", "Fit picture", "Shows the whole picture.", GLFW_KEY_HOME, false, false,
+         [](E& e) { e.viewport.zoom = 0, e.viewport.offset = glm::dvec2(0.0); }},
+        {"screenshot", "Picture", "Screenshot", "Saves the window as a PNG file in the output folder.", GLFW_KEY_F12, false, false,
+         [](E& e) { e.screenshot_wanted = true; }},
+        {"expert", "View", "Expert", "Shows the parameters for experts, too.", GLFW_KEY_E, true, false,
+         [](E& e) { e.show_expert = !e.show_expert; }},
+        {"problems", "View", "Problems", "Lists everything that is wrong with the graph.", GLFW_KEY_P, false, false,
+         [](E& e) { e.show_problems = !e.show_problems; }},
+        {"theme", "View", "Dark or light", "Changes between the dark and the light theme.", GLFW_KEY_T, true, false,
+         [](E& e) { e.settings.dark = !e.settings.dark, e.theme_changed = true; }},
+        {"larger", "View", "Larger", "Makes texts and everything else larger.", GLFW_KEY_EQUAL, true, false, [](E& e) { rescale(e, 1.125); }},
+        {"smaller", "View", "Smaller", "Makes texts and everything else smaller.", GLFW_KEY_MINUS, true, false, [](E& e) { rescale(e, 1 / 1.125); }},
+        {"help", "View", "Help", "Shows what can be done, and with which keys.", GLFW_KEY_F1, false, false,
+         [](E& e) { e.show_help = !e.show_help; }},
+    };
+}
+
+}  // namespace
+
+const std::vector<Action>& actions() {
+    static const std::vector<Action> all = make_actions();
+    return all;
+}
+
+const Action& action(std::string_view id) {
+    for (const Action& a : actions())
+        if (id == a.id) return a;
+    assert(false && "no such action");
+    return actions().front();
+}
+
+std::string key_text(const Action& a) {
+    std::string name;
+    switch (a.key) {
+        case GLFW_KEY_DELETE: name = "Delete"; break;
+        case GLFW_KEY_TAB: name = "Tab"; break;
+        case GLFW_KEY_ESCAPE: name = "Escape"; break;
+        case GLFW_KEY_HOME: name = "Home"; break;
+        case GLFW_KEY_EQUAL: name = "+"; break;
+        default:
+            if (a.key >= GLFW_KEY_F1 && a.key <= GLFW_KEY_F25)
+                name = fmt::format("F{}", a.key - GLFW_KEY_F1 + 1);
+            else
+                name = std::string(1, char(a.key));
+    }
+    return (a.ctrl ? "Ctrl+" : "") + std::string(a.shift ? "Shift+" : "") + name;
+}
+
+void handle_keys(Editor& editor) {
+    const ImGuiIO& io = ImGui::GetIO();
+    const bool popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
+    for (const Action& a : actions()) {
+        // A picture can be taken of anything.
+        if ((io.WantTextInput || popup) && a.key != GLFW_KEY_F12) continue;
+        if (io.KeyCtrl != a.ctrl || io.KeyShift != a.shift || io.KeyAlt) continue;
+        if (!ImGui::IsKeyPressed(a.key, false)) continue;
+        if (!a.possible || a.possible(editor)) a.run(editor);
+        return;
+    }
+}
+
+void action_button(Editor& editor, std::string_view id) {
+    const Action& a = action(id);
+    const bool possible = !a.possible || a.possible(editor);
+    ImGui::BeginDisabled(!possible);
+    if (ImGui::Button(a.title)) a.run(editor);
+    ImGui::EndDisabled();
+    mark(editor, std::string("action:") + a.id);
+    tooltip(fmt::format("{}  ({})", a.doc, key_text(a)));
+}
+
+}  // namespace voxloom::editor

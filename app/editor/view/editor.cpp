@@ -1,0 +1,316 @@
+#include "app/editor/view/editor.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "app/editor/view/actions.h"
+#include "core/base/error.h"
+#include "core/base/text.h"
+
+namespace voxloom::editor {
+
+namespace fs = std::filesystem;
+
+Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
+    : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
+      examples(find_examples()), evaluator(nodes, std::move(wake)) {}
+
+// --- small things that all regions use -----------------------------------------------------------
+
+void say(Editor& editor, std::string message, bool error) {
+    editor.message = std::move(message);
+    editor.message_is_error = error;
+    editor.message_until = ImGui::GetTime() + (error ? 6 : 3);
+}
+
+void edit(Editor& editor, const std::function<void()>& f) {
+    // A value that is dragged is one step from the button's press to its release.
+    if (!editor.drag_step && ImGui::IsMouseDown(ImGuiMouseButton_Left)) editor.drag_step.emplace(editor.work.document);
+    try {
+        f();
+    } catch (const Error& e) {
+        say(editor, e.what(), true);
+    }
+}
+
+void close_drag_step(Editor& editor) { editor.drag_step.reset(); }
+
+void mark(Editor& editor, std::string name) {
+    mark(editor, std::move(name), ImGui::GetItemRectMin(), ImGui::GetItemRectMax());
+}
+
+void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi) {
+    editor.marks.push_back({std::move(name), lo, hi});
+}
+
+const NodeStatus* status_of(const Editor& editor, const std::string& node) {
+    auto found = editor.live.nodes.find(node);
+    return found == editor.live.nodes.end() ? nullptr : &found->second;
+}
+
+// --- documents -----------------------------------------------------------------------------------
+
+namespace {
+
+void begin_document(Editor& editor, Workspace work) {
+    close_drag_step(editor);
+    editor.work = std::move(work);
+    editor.texts.clear();
+    editor.id_of.clear();
+    editor.viewport.port = {};
+    editor.viewport.zoom = 0;
+    editor.start_page = false;
+    fit_canvas(editor);
+}
+
+void save_to(Editor& editor, const fs::path& file) {
+    close_drag_step(editor);
+    try {
+        save_workspace(editor.work, file, editor.registry);
+        remember(editor.settings, file);
+        save_settings(editor.settings, editor.settings_file);
+        say(editor, "Saved " + file.string());
+        if (auto next = std::exchange(editor.after_saving_asked, nullptr)) next();
+    } catch (const Error& e) {
+        say(editor, e.what(), true);
+    }
+}
+
+}  // namespace
+
+void new_graph(Editor& editor) { begin_document(editor, {}); }
+
+void open_graph(Editor& editor, const fs::path& file) {
+    try {
+        begin_document(editor, open_workspace(file));
+        remember(editor.settings, file);
+        save_settings(editor.settings, editor.settings_file);
+    } catch (const Error& e) {
+        say(editor, e.what(), true);
+    }
+}
+
+void save(Editor& editor) {
+    if (editor.work.file.empty()) return save_as(editor);
+    save_to(editor, editor.work.file);
+}
+
+void save_as(Editor& editor) {
+    open_file_dialog(editor, FileDialog::Purpose::save_graph, editor.work.file, [&editor](const fs::path& file) {
+        fs::path named = file;
+        if (!named.has_extension()) named += ".yaml";
+        save_to(editor, named);
+    });
+}
+
+void unless_changed(Editor& editor, std::function<void()> f) {
+    if (!editor.work.changed()) return f();
+    editor.after_saving_asked = std::move(f);
+    editor.ask_about_changes = true;
+}
+
+// --- evaluation ----------------------------------------------------------------------------------
+
+WireEnd shown_port(const Editor& editor) {
+    auto is_image = [&](const WireEnd& end) {
+        const GraphNode* node = editor.work.graph().find(end.node);
+        const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
+        const PortSpec* port = type ? type->find_output(end.port) : nullptr;
+        return port && type_of(*port) == PortType::image;
+    };
+    if (is_image(editor.viewport.port)) return editor.viewport.port;
+    for (const WireEnd& end : editor.work.graph().outputs)
+        if (is_image(end)) return end;
+    for (const GraphNode& node : editor.work.graph().nodes)
+        if (const NodeType* type = editor.registry.find(node.type))
+            for (const PortSpec& port : type->outputs)
+                if (type_of(port) == PortType::image) return {node.id, port.key, {}};
+    return {};
+}
+
+namespace {
+
+// Where nodes stand changes no result.
+bool same_results(const Graph& a, const Graph& b) {
+    Graph x = a, y = b;
+    for (GraphNode& node : x.nodes) node.at.reset();
+    for (GraphNode& node : y.nodes) node.at.reset();
+    return x.file == y.file && same_content(x, y);
+}
+
+void submit(Editor& editor, bool coarse, bool write) {
+    Evaluator::Request request;
+    request.graph = editor.work.graph();
+    request.watched = editor.watched;
+    request.coarse = coarse;
+    request.write = write;
+    request.output_folder = editor.output_folder;
+    editor.submitted = request.graph;
+    editor.submitted_coarse = coarse;
+    editor.ever_submitted = true;
+    editor.evaluator.submit(std::move(request));
+}
+
+bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
+
+}  // namespace
+
+void submit_changes(Editor& editor) {
+    const WireEnd shown = shown_port(editor);
+    const bool others = editor.watched.size() != (shown.node.empty() ? 0u : 1u) ||
+                        (!editor.watched.empty() && !same_end(editor.watched[0], shown));
+    if (others) {
+        editor.watched.clear();
+        if (!shown.node.empty()) editor.watched.push_back(shown);
+    }
+    const bool changed = !editor.ever_submitted || others || !same_results(editor.submitted, editor.work.graph());
+    if (changed || (editor.submitted_coarse && !editor.moving)) submit(editor, editor.moving, false);
+}
+
+void write_files(Editor& editor) {
+    submit(editor, false, true);
+    say(editor, "Writing files to " + fs::absolute(editor.output_folder).lexically_normal().string());
+}
+
+// --- a frame -------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr ImGuiWindowFlags kRegion = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
+                                     ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
+                                     ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNavInputs;
+
+void region(const char* name, ImVec2 lo, ImVec2 hi, ImGuiWindowFlags flags, ImVec2 padding, const std::function<void()>& f) {
+    ImGui::SetNextWindowPos(lo);
+    ImGui::SetNextWindowSize({std::max(hi.x - lo.x, 1.f), std::max(hi.y - lo.y, 1.f)});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, padding);
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowMinSize, ImVec2(1, 1));
+    ImGui::Begin(name, nullptr, kRegion | flags);
+    ImGui::PopStyleVar(2);
+    f();
+    ImGui::End();
+}
+
+// A thin strip between two regions that can be dragged. `share` is of the length from `from` on.
+void splitter(Editor& editor, const char* name, bool vertical, ImVec2 lo, ImVec2 hi, float from, float length, float& share) {
+    region(name, lo, hi, ImGuiWindowFlags_NoScrollbar, {0, 0}, [&] {
+        ImGui::InvisibleButton("drag", {std::max(hi.x - lo.x, 1.f), std::max(hi.y - lo.y, 1.f)});
+        mark(editor, name);
+        if (ImGui::IsItemHovered() || ImGui::IsItemActive())
+            ImGui::SetMouseCursor(vertical ? ImGuiMouseCursor_ResizeEW : ImGuiMouseCursor_ResizeNS);
+        if (!ImGui::IsItemActive()) return;
+        const float at = vertical ? ImGui::GetMousePos().x : ImGui::GetMousePos().y;
+        share = std::clamp((at - from) / length, 0.15f, 0.85f);
+    });
+}
+
+void draw_message(Editor& editor) {
+    if (editor.message.empty() || ImGui::GetTime() > editor.message_until) {
+        editor.message.clear();
+        return;
+    }
+    const Theme& t = theme();
+    const ImVec2 screen = ImGui::GetIO().DisplaySize;
+    const ImVec2 text = ImGui::CalcTextSize(editor.message.c_str(), nullptr, false, ui(420));
+    const glm::dvec2 below = editor.canvas.lo + editor.canvas.size * glm::dvec2(0.5, 1);
+    ImVec2 at = editor.message_is_error ? ImGui::GetMousePos()
+                                        : ImVec2(float(below.x) - text.x / 2 - ui(12), float(below.y) - ui(34) - text.y);
+    at.x = std::clamp(at.x + ui(editor.message_is_error ? 16 : 0), ui(8), std::max(ui(8), screen.x - text.x - ui(32)));
+    at.y = std::clamp(at.y + ui(editor.message_is_error ? 20 : 0), ui(8), std::max(ui(8), screen.y - text.y - ui(32)));
+    ImDrawList& list = *ImGui::GetForegroundDrawList();
+    const ImVec2 hi{at.x + text.x + ui(24), at.y + text.y + ui(16)};
+    list.AddRectFilled(at, hi, t.node, ui(6));
+    list.AddRect(at, hi, editor.message_is_error ? t.bad : t.accent, ui(6));
+    list.AddText(t.body, t.body->FontSize, {at.x + ui(12), at.y + ui(8)}, t.text, editor.message.c_str(), nullptr, ui(420));
+    mark(editor, "message", at, hi);
+}
+
+}  // namespace
+
+void draw(Editor& editor) {
+    editor.marks.clear();
+    editor.moving = false;
+    editor.evaluator.refresh(editor.live);
+    handle_keys(editor);
+
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float top = ui(44), bottom = size.y - ui(28), gap = ui(5);
+    const float x = std::round(size.x * editor.split_x), y = std::round(top + (bottom - top) * editor.split_y);
+    region("toolbar", {0, 0}, {size.x, top}, ImGuiWindowFlags_NoScrollbar, {ui(10), ui(8)}, [&] { draw_toolbar(editor); });
+    region("graph", {0, top}, {x, bottom}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse, {0, 0},
+           [&] { draw_canvas(editor); });
+    region("picture", {x + gap, top}, {size.x, y}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse, {0, 0},
+           [&] { draw_viewport(editor); });
+    region("parameters", {x + gap, y + gap}, {size.x, bottom}, 0, {ui(14), ui(10)}, [&] { draw_parameters(editor); });
+    region("status", {0, bottom}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, {ui(12), ui(5)}, [&] { draw_status_bar(editor); });
+    splitter(editor, "split:x", true, {x, top}, {x + gap, bottom}, 0, size.x, editor.split_x);
+    splitter(editor, "split:y", false, {x + gap, y}, {size.x, y + gap}, top, bottom - top, editor.split_y);
+    if (editor.start_page) draw_start_page(editor);
+    draw_add_menu(editor);
+    draw_dialogs(editor);
+    if (editor.show_help) draw_help(editor);
+    draw_message(editor);
+    // What is done where the button is let go still belongs to the drag.
+    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) close_drag_step(editor);
+    submit_changes(editor);
+}
+
+// --- toolbar and status bar ----------------------------------------------------------------------
+
+void draw_toolbar(Editor& editor) {
+    const std::vector<std::vector<const char*>> groups = {
+        {"new", "open", "save"}, {"undo", "redo"}, {"add", "arrange", "fit"}, {"write", "stop"}, {"help"}};
+    for (const auto& group : groups) {
+        for (const char* id : group) {
+            action_button(editor, id);
+            ImGui::SameLine();
+        }
+        ImGui::Dummy({ui(6), 0});
+        ImGui::SameLine();
+    }
+    const std::string name = (editor.work.file.empty() ? "Untitled" : editor.work.file.filename().string()) +
+                             (editor.work.changed() ? " *" : "");
+    const float left = ImGui::GetCursorPosX();
+    const float width = ImGui::CalcTextSize(name.c_str()).x;
+    ImGui::SetCursorPosX(std::max(left, ImGui::GetWindowWidth() - width - ui(14)));
+    ImGui::AlignTextToFramePadding();
+    text_in(theme().muted, name.c_str());
+    tooltip(editor.work.file.empty() ? "Not saved yet." : fs::absolute(editor.work.file).lexically_normal().string());
+}
+
+void draw_status_bar(Editor& editor) {
+    const Theme& t = theme();
+    const Evaluator::State& live = editor.live;
+    std::string state = "Ready";
+    ImU32 color = t.muted;
+    if (live.busy) {
+        state = "Running";
+        color = t.accent;
+        for (const auto& [id, status] : live.nodes)
+            if (status.state == NodeState::running) {
+                state = "Running " + id;
+                if (status.fraction >= 0) state += fmt::format("  {:.0f} %", 100 * status.fraction);
+                if (status.seconds_left >= 0) state += ", " + human_seconds(status.seconds_left) + " left";
+            }
+    } else if (live.wall_seconds > 0) {
+        state = "Ready, last run " + human_seconds(live.wall_seconds);
+    }
+    text_in(color, state.c_str());
+    mark(editor, "state");
+    if (!live.problems.empty()) {
+        ImGui::SameLine(0, ui(24));
+        const std::string problems = fmt::format("{} problem{}", live.problems.size(), live.problems.size() == 1 ? "" : "s");
+        text_in(t.bad, problems.c_str());
+        if (ImGui::IsItemClicked()) editor.show_problems = !editor.show_problems;
+        tooltip("Click for the list.  (P)");
+        mark(editor, "problems");
+    }
+    const std::string right = fmt::format("{} nodes   {:.0f} %", editor.work.graph().nodes.size(), 100 * editor.canvas.zoom);
+    ImGui::SameLine(ImGui::GetWindowWidth() - ImGui::CalcTextSize(right.c_str()).x - ui(12));
+    text_in(t.muted, right.c_str());
+}
+
+}  // namespace voxloom::editor

@@ -1,0 +1,153 @@
+// The editor's state, and the one function that draws a frame of it.
+//
+// Immediate mode: what is drawn follows from the state alone. Edits go through edit(), which turns a
+// refusal into a message at the pointer; whatever the frame has changed is handed to the evaluator at
+// its end. Everything here belongs to the thread that owns the window.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "app/editor/model/commands.h"
+#include "app/editor/model/evaluator.h"
+#include "app/editor/model/settings.h"
+#include "app/editor/view/theme.h"
+
+namespace voxloom::editor {
+
+// The part of the canvas that is seen, and what the mouse is doing there.
+struct Canvas {
+    enum class Drag { none, pan, nodes, box, wire };
+    glm::dvec2 pan{0.0};  // canvas coordinates of the upper left corner
+    double zoom = 1;      // pixels (before scaling) a canvas unit
+    bool fit_wanted = true;
+    glm::dvec2 lo{0.0}, size{0.0};  // on the screen, of the last frame
+    Drag drag = Drag::none;
+    glm::dvec2 grabbed{0.0};  // canvas coordinates where the drag began
+    glm::dvec2 moved{0.0};    // by which the selected nodes are shown away from their places
+    WireEnd wire;             // the port that a wire is drawn from
+    bool wire_from_output = true;
+    // The document's ports and boxes, made anew when its text has changed.
+    std::string text = "-";
+    std::vector<NodePorts> ports;
+    std::vector<NodeBox> boxes;
+
+    glm::dvec2 to_screen(glm::dvec2 p) const { return lo + (p - pan) * zoom * double(theme().scale); }
+    glm::dvec2 to_canvas(glm::dvec2 p) const { return pan + (p - lo) / (zoom * double(theme().scale)); }
+};
+
+// The list to choose a new node from.
+struct AddMenu {
+    bool opened = false;
+    glm::dvec2 at{0.0};       // canvas coordinates where the node goes
+    std::string query;
+    int chosen = 0;
+    std::vector<Fit> fits;    // what fits the wire that was dropped; all nodes where there is no wire
+    std::optional<WireEnd> end;
+    bool end_is_output = true;
+};
+
+struct Viewport {
+    WireEnd port;             // an image; empty: the first one that there is
+    double zoom = 0;          // screen pixels a picture pixel; 0: fitted
+    glm::dvec2 offset{0.0};   // of the picture's middle from the viewport's, in screen pixels
+    unsigned texture = 0;
+    std::uint64_t serial = 0;  // of the value in the texture
+    glm::ivec2 size{0};
+};
+
+struct FileDialog {
+    enum class Purpose { open_graph, save_graph, parameter };
+    Purpose purpose = Purpose::open_graph;
+    bool opened = false;
+    std::filesystem::path folder;
+    std::string name;
+    std::vector<std::filesystem::path> entries;  // of the folder; folders first
+    std::function<void(const std::filesystem::path&)> chosen;
+};
+
+// A thing on the screen with a name, for tests and other programs that look for it.
+struct Mark {
+    std::string name;
+    ImVec2 lo, hi;
+};
+
+struct Editor {
+    Editor(const Registry& registry, std::filesystem::path settings_file, std::function<void()> wake);
+
+    const Registry& registry;
+    std::filesystem::path settings_file;
+    Settings settings;
+    std::vector<Example> examples;
+
+    Workspace work;
+    std::optional<Document::Step> drag_step;  // all edits of one drag are one step of undo
+    Canvas canvas;
+    AddMenu add;
+    Viewport viewport;
+    FileDialog files;
+    bool start_page = true, show_help = false, show_problems = false, show_expert = false;
+    std::function<void()> after_saving_asked;  // waits for the answer about unsaved changes
+    bool ask_about_changes = false;
+    std::string id_text, id_of;               // the node's name while it is typed
+    std::map<std::string, std::string> texts;  // of parameters while they are typed
+    std::string copied;
+    float split_x = 0.6f, split_y = 0.5f;      // of the window: canvas | rest; picture above parameters
+    bool quit = false;
+    bool theme_changed = false, screenshot_wanted = false;
+
+    std::string message;        // a sentence at the pointer, until message_until
+    double message_until = 0;
+    bool message_is_error = false;
+
+    Graph submitted;            // as the evaluator has it
+    std::vector<WireEnd> watched;
+    bool submitted_coarse = false, ever_submitted = false, moving = false;
+    std::filesystem::path output_folder = "out";
+
+    std::vector<Mark> marks;
+    Evaluator::State live;
+    Evaluator evaluator;        // the last: it ends first
+};
+
+void draw(Editor& editor);
+
+// Runs f, which edits the document; what it throws is shown at the pointer.
+void edit(Editor& editor, const std::function<void()>& f);
+void say(Editor& editor, std::string message, bool error = false);
+void mark(Editor& editor, std::string name);  // the last item of ImGui
+void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi);
+
+const NodeStatus* status_of(const Editor& editor, const std::string& node);
+// The image port that the viewport shows, or an empty end.
+WireEnd shown_port(const Editor& editor);
+
+void close_drag_step(Editor& editor);
+void new_graph(Editor& editor);
+void open_graph(Editor& editor, const std::filesystem::path& file);
+void save(Editor& editor);
+void save_as(Editor& editor);
+// Runs f now, or after the question whether the changes are to be saved.
+void unless_changed(Editor& editor, std::function<void()> f);
+void open_file_dialog(Editor& editor, FileDialog::Purpose purpose, const std::filesystem::path& at,
+                      std::function<void(const std::filesystem::path&)> chosen);
+void open_add_menu(Editor& editor, glm::dvec2 at);
+void fit_canvas(Editor& editor);
+void submit_changes(Editor& editor);
+void write_files(Editor& editor);
+
+// The regions of the window, in the order in which they are drawn.
+void draw_toolbar(Editor& editor);
+void draw_canvas(Editor& editor);
+void draw_add_menu(Editor& editor);
+void draw_viewport(Editor& editor);
+void draw_parameters(Editor& editor);
+void draw_status_bar(Editor& editor);
+void draw_start_page(Editor& editor);
+void draw_dialogs(Editor& editor);
+void draw_help(Editor& editor);
+
+}  // namespace voxloom::editor

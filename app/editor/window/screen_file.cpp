@@ -1,0 +1,57 @@
+#include "app/editor/window/screen_file.h"
+
+#include <GL/gl.h>
+#include <png.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/output_file.h"
+
+namespace voxloom::editor {
+
+std::string screen_to_json(const Editor& editor) {
+    nlohmann::json json;
+    json["frame"] = ImGui::GetFrameCount();
+    json["file"] = editor.work.file.string();
+    json["changed"] = editor.work.changed();
+    json["busy"] = editor.live.busy || editor.moving || editor.submitted_coarse;
+    json["message"] = editor.message;
+    json["selected"] = editor.work.selected;
+    json["text"] = editor.work.document.text();
+    json["problems"] = editor.live.problems.size();
+    for (const auto& [id, status] : editor.live.nodes) json["states"][id] = name_of(status.state);
+    for (const auto& [port, value] : editor.live.values)
+        json["values"][port] = {{"serial", value.serial}, {"fresh", value.fresh}};
+    for (const Mark& mark : editor.marks) json["items"][mark.name] = {mark.lo.x, mark.lo.y, mark.hi.x, mark.hi.y};
+    return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+void save_screenshot(const std::filesystem::path& file, int width, int height) {
+    std::vector<unsigned char> pixels(std::size_t(width) * std::size_t(height) * 4);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
+    for (std::size_t i = 3; i < pixels.size(); i += 4) pixels[i] = 255;
+    png_image image;
+    std::memset(&image, 0, sizeof image);
+    image.version = PNG_IMAGE_VERSION;
+    image.width = png_uint_32(width);
+    image.height = png_uint_32(height);
+    image.format = PNG_FORMAT_RGBA;
+    // OpenGL's rows go upwards.
+    const png_int_32 stride = -png_int_32(width) * 4;
+    png_alloc_size_t bytes = 0;
+    std::vector<std::byte> encoded;
+    bool fine = png_image_write_to_memory(&image, nullptr, &bytes, 0, pixels.data(), stride, nullptr);
+    encoded.resize(fine ? bytes : 0);
+    fine = fine && png_image_write_to_memory(&image, encoded.data(), &bytes, 0, pixels.data(), stride, nullptr);
+    if (!fine) fail("{}: the screenshot cannot be encoded: {}", file.string(), image.message);
+    std::filesystem::create_directories(file.parent_path());
+    OutputFile out(file);
+    out.write(std::span(encoded).first(bytes));
+    out.commit();
+}
+
+}  // namespace voxloom::editor

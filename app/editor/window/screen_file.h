@@ -1,0 +1,19 @@
+// What is on the screen, for programs: tests, and tools that help people who cannot see it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "app/editor/view/editor.h"
+
+namespace voxloom::editor {
+
+// JSON: `items` has name and rectangle [left, top, right, bottom], in window coordinates, of everything
+// that can be clicked or read; further the file, whether it has changes, whether something runs, the
+// message, the selected nodes, and the states of all nodes.
+std::string screen_to_json(const Editor& editor);
+
+// The window's pixels as a PNG file. Called when a frame has been drawn. Throws Error.
+void save_screenshot(const std::filesystem::path& file, int width, int height);
+
+}  // namespace voxloom::editor

@@ -1,0 +1,162 @@
+#include "app/editor/window/window.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GL/gl.h>
+#include <GLFW/glfw3.h>
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <fmt/format.h>
+
+#include <chrono>
+#include <ctime>
+#include <memory>
+
+#include "app/editor/view/editor.h"
+#include "app/editor/window/screen_file.h"
+#include "core/base/error.h"
+#include "core/base/output_file.h"
+
+namespace voxloom::editor {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// After an event a few frames more are drawn: what it changed may change what the next one shows.
+constexpr int kFramesAfterEvent = 3;
+constexpr double kFrameSeconds = 1.0 / 60;
+
+std::string last_glfw_error() {
+    const char* text = nullptr;
+    glfwGetError(&text);
+    return text ? text : "unknown reason";
+}
+
+// The window with everything that must be undone with it, in order.
+class Window {
+  public:
+    explicit Window(const EditArguments& arguments) {
+        if (!glfwInit()) fail("no window can be opened ({}); is there a display? 'voxloom run' needs none", last_glfw_error());
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
+        glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+        glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+        window_ = glfwCreateWindow(arguments.size.x, arguments.size.y, "voxloom", nullptr, nullptr);
+        if (!window_) {
+            const std::string reason = last_glfw_error();
+            glfwTerminate();
+            fail("no window with OpenGL 3.3 can be opened ({}); install a driver, such as libgl1-mesa-dri", reason);
+        }
+        glfwMakeContextCurrent(window_);
+        glfwSwapInterval(1);
+        IMGUI_CHECKVERSION();
+        ImGui::CreateContext();
+        ImGui::GetIO().IniFilename = nullptr;
+        ImGui_ImplGlfw_InitForOpenGL(window_, true);
+        ImGui_ImplOpenGL3_Init("#version 330");
+    }
+    ~Window() {
+        ImGui_ImplOpenGL3_Shutdown();
+        ImGui_ImplGlfw_Shutdown();
+        ImGui::DestroyContext();
+        glfwDestroyWindow(window_);
+        glfwTerminate();
+    }
+    Window(const Window&) = delete;
+    Window& operator=(const Window&) = delete;
+    GLFWwindow* get() const { return window_; }
+
+  private:
+    GLFWwindow* window_ = nullptr;
+};
+
+void set_theme(Editor& editor, float screen_scale) {
+    editor.theme_changed = false;
+    if (apply_theme(editor.settings.dark, screen_scale * float(editor.settings.text_scale))) {
+        ImGui_ImplOpenGL3_DestroyFontsTexture();
+        ImGui_ImplOpenGL3_CreateFontsTexture();
+    }
+    save_settings(editor.settings, editor.settings_file);
+}
+
+void take_screenshot(Editor& editor, glm::ivec2 size) {
+    editor.screenshot_wanted = false;
+    const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    std::tm local{};
+    localtime_r(&now, &local);
+    char name[64];
+    std::strftime(name, sizeof name, "screenshot-%Y%m%d-%H%M%S", &local);
+    fs::path file = editor.output_folder / fmt::format("{}.png", name);
+    for (int i = 2; fs::exists(file); ++i) file = editor.output_folder / fmt::format("{}-{}.png", name, i);
+    try {
+        save_screenshot(file, size.x, size.y);
+        say(editor, "Saved " + fs::absolute(file).lexically_normal().string());
+    } catch (const std::exception& e) {
+        say(editor, e.what(), true);
+    }
+}
+
+void write_screen(const Editor& editor, const fs::path& file) {
+    OutputFile out(file);
+    out.write(screen_to_json(editor));
+    out.commit();
+}
+
+void draw_frame(Editor& editor, GLFWwindow* window) {
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+    draw(editor);
+    ImGui::Render();
+    glm::ivec2 size;
+    glfwGetFramebufferSize(window, &size.x, &size.y);
+    glViewport(0, 0, size.x, size.y);
+    glClearColor(0, 0, 0, 1);
+    glClear(GL_COLOR_BUFFER_BIT);
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    if (editor.screenshot_wanted) take_screenshot(editor, size);
+    glfwSwapBuffers(window);
+}
+
+}  // namespace
+
+int run_window(const EditArguments& arguments, const Registry& registry) {
+    Window window(arguments);
+    // Editors hold textures of the window's context, so they end before it.
+    Editor editor(registry, settings_file(), [] { glfwPostEmptyEvent(); });
+    editor.output_folder = arguments.out;
+    float screen_scale = 1, ignored = 1;
+    glfwGetWindowContentScale(window.get(), &screen_scale, &ignored);
+    if (arguments.scale > 0) screen_scale = float(arguments.scale);
+    set_theme(editor, screen_scale);
+    // A file that cannot be read is said before there is anything to lose.
+    if (!arguments.graph.empty()) {
+        editor.work = open_workspace(arguments.graph);
+        editor.start_page = false;
+        remember(editor.settings, arguments.graph);
+        save_settings(editor.settings, editor.settings_file);
+    }
+
+    for (int frames = kFramesAfterEvent; !editor.quit;) {
+        const bool held = ImGui::IsAnyMouseDown();
+        if (frames > 0 || held)
+            glfwPollEvents();
+        else
+            glfwWaitEventsTimeout(editor.message.empty() ? 5.0 : 0.25);
+        frames = frames > 0 ? frames - 1 : kFramesAfterEvent;
+        if (glfwWindowShouldClose(window.get())) {
+            glfwSetWindowShouldClose(window.get(), GLFW_FALSE);
+            unless_changed(editor, [&editor] { editor.quit = true; });
+        }
+        const double begun = glfwGetTime();
+        if (editor.theme_changed) set_theme(editor, screen_scale);
+        draw_frame(editor, window.get());
+        if (!arguments.screen.empty()) write_screen(editor, arguments.screen);
+        // Software renderers do not wait for the screen.
+        if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && spare > 0)
+            glfwWaitEventsTimeout(spare);
+    }
+    if (editor.viewport.texture) glDeleteTextures(1, &editor.viewport.texture);
+    return 0;
+}
+
+}  // namespace voxloom::editor

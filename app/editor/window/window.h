@@ -1,0 +1,22 @@
+// `voxloom edit`: the window and its loop.
+#pragma once
+
+#include <filesystem>
+#include <glm/glm.hpp>
+
+#include "core/plugin/registry.h"
+
+namespace voxloom::editor {
+
+struct EditArguments {
+    std::filesystem::path graph;              // empty: the start page
+    std::filesystem::path out = "out";        // where screenshots and written files go
+    glm::ivec2 size{1600, 960};               // of the window, in its screen's coordinates
+    double scale = 0;                         // pixels a unit; 0: the screen's own
+    std::filesystem::path screen;             // where to write what is on the screen; empty: nowhere
+};
+
+// Returns when the window is closed. Throws Error where there is no display or no OpenGL.
+int run_window(const EditArguments& arguments, const Registry& registry);
+
+}  // namespace voxloom::editor

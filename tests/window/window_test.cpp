@@ -1,0 +1,196 @@
+// The editor as people meet it: a window, a mouse and keys.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "core/graph/document.h"
+#include "tests/support/volumes.h"
+#include "tests/window/screen.h"
+
+namespace voxloom {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::EditorProcess;
+using testing::VirtualDisplay;
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const char* const kGraph = R"(voxloom: 1
+# A small head, drawn and written.
+outputs: [view.image]
+nodes:
+  - id: head
+    type: readers.phantom
+    set: { kind: ct-head, dims: [32, 32, 32], type: u16 }
+    at: [0, 0]
+  - id: tf
+    type: scene.transfer
+    in:  { fit: head.volume }
+    set: { preset: materials }
+    at: [220, 120]
+  - id: camera
+    type: scene.camera
+    in:  { fit: head.volume }
+    set: { azimuth: 40, framing: box }
+    at: [220, 240]
+  - id: view
+    type: slicer.render
+    in:  { source: head.volume, transfer: tf.transfer, camera: camera.camera }
+    set: { size: [120, 120] }
+    at: [480, 0]
+  - id: file
+    type: writers.image
+    in:  { image: view.image }
+    set: { path: picture.png }
+    at: [740, 60]
+)";
+
+struct Window : ::testing::Test {
+    testing::TempFolder folder;
+
+    void SetUp() override {
+        if (std::string missing = testing::why_no_display(); !missing.empty()) GTEST_SKIP() << missing;
+        std::ofstream(folder.path() / "graph.yaml") << kGraph;
+    }
+    fs::path graph() const { return folder.path() / "graph.yaml"; }
+    static std::string slurp(const fs::path& file) {
+        std::ifstream in(file, std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+    static bool shows_final(const json& s, const std::string& port) {
+        return !s["busy"].get<bool>() && s["values"].contains(port) && s["values"][port]["fresh"].get<bool>();
+    }
+    // Kept beside the build, for people to look at.
+    static void keep(const fs::path& picture, const std::string& name) {
+        const fs::path to = fs::path(VOXLOOM_BINARY_DIR) / "screenshots";
+        fs::create_directories(to);
+        fs::copy_file(picture, to / (name + ".png"), fs::copy_options::overwrite_existing);
+    }
+};
+
+TEST_F(Window, aGraphIsOpenedTunedUndoneSavedAndRunsToTheSamePicture) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+
+    editor.click("node:camera");
+    json s = editor.with("param:camera.azimuth");
+    EXPECT_EQ(s["selected"], json::array({"camera"}));
+    EXPECT_FALSE(s["changed"].get<bool>());
+    const auto serial = s["values"]["view.image"]["serial"].get<int>();
+    editor.move_to("param:camera.azimuth", 0.3);
+    editor.press();
+    editor.move_by(60, 0);
+    editor.move_by(30, 0);
+    editor.release();
+    s = editor.wait_for("the picture of the change", [&](const json& now) {
+        return now["changed"].get<bool>() && shows_final(now, "view.image") && now["values"]["view.image"]["serial"] > serial;
+    });
+    const std::string changed = s["text"];
+    EXPECT_NE(changed, kGraph);
+    EXPECT_THAT(changed, HasSubstr("# A small head, drawn and written."));
+
+    editor.key("z", "ctrl");
+    s = editor.wait_for("undo", [&](const json& now) { return now["text"] != changed; });
+    EXPECT_EQ(s["text"], kGraph) << "one drag is one step";
+    editor.key("y", "ctrl");
+    editor.wait_for("redo", [&](const json& now) { return now["text"] == changed; });
+    editor.key("s", "ctrl");
+    editor.wait_for("saving", [](const json& now) { return !now["changed"].get<bool>(); });
+    EXPECT_EQ(slurp(graph()), changed);
+
+    editor.idle();
+    editor.key("F5");
+    const fs::path written = folder.path() / "e/out/picture.png";
+    editor.wait_for("the written picture", [&](const json& now) { return fs::exists(written) && !now["busy"].get<bool>(); });
+    const std::string run = VOXLOOM_BINARY_DIR "/bin/voxloom run --quiet " + graph().string() + " --output file --out " +
+                            (folder.path() / "headless").string() + " >/dev/null 2>&1";
+    ASSERT_EQ(std::system(run.c_str()), 0);
+    EXPECT_EQ(slurp(written), slurp(folder.path() / "headless/picture.png"));
+    EXPECT_GT(fs::file_size(written), 1000u);
+
+    keep(editor.screenshot(), "edited-1280x720");
+    editor.key("q", "ctrl");
+    EXPECT_EQ(editor.wait(), 0);
+}
+
+TEST_F(Window, aWrongWireIsRefusedWithItsReason) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.idle();
+    editor.drag("out:camera.camera", "in:view.source");
+    json s = editor.with("message");
+    EXPECT_THAT(s["message"].get<std::string>(), HasSubstr("takes Volume or Bricks, and this is Camera"));
+    EXPECT_EQ(s["text"], kGraph);
+    keep(editor.screenshot(), "refused");
+}
+
+TEST_F(Window, aPipelineIsBuiltFromAnEmptyCanvas) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {"--size", "1280x720"});
+    editor.with("start:new");
+    keep(editor.screenshot(), "start");
+    editor.click("start:new");
+    editor.key("Tab");
+    editor.with("add-query");
+    editor.type("phantom");
+    keep(editor.screenshot(), "add");
+    editor.key("Return");
+    editor.with("node:phantom");
+    // A wire dropped in empty space offers what fits.
+    editor.move_to("out:phantom.volume");
+    editor.press();
+    editor.move_by(5, 5);
+    editor.move_by(120, 60);
+    editor.release();
+    json s = editor.with("add-query");
+    EXPECT_FALSE(s["items"].contains("add:scene.lights")) << "nothing there takes a volume";
+    editor.type("transfer");
+    editor.key("Return");
+    s = editor.wait_for("the transfer function", [](const json& now) { return now["items"].contains("node:transfer"); });
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("fit: phantom.volume"));
+    for (int i = 0; i < 3; ++i) editor.key("z", "ctrl");
+    s = editor.idle();
+    EXPECT_EQ(s["text"], Document().text());
+}
+
+TEST_F(Window, unsavedChangesAreAskedFor) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.idle();
+    editor.click("node:tf");
+    editor.key("Delete");
+    editor.wait_for("a change", [](const json& s) { return s["changed"].get<bool>(); });
+    editor.key("q", "ctrl");
+    editor.click("changes:cancel");
+    editor.key("q", "ctrl");
+    editor.click("changes:save");
+    EXPECT_EQ(editor.wait(), 0);
+    EXPECT_EQ(Document::load(graph()).graph().find("tf"), nullptr);
+}
+
+TEST_F(Window, everythingIsReadableOnALargeScreen) {
+    VirtualDisplay display(2560, 1440);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "2560x1440", "--scale", "1.5"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    editor.click("node:view");
+    const json s = editor.with("param:view.slice_distance");
+    // Everything that has a name lies inside of the window.
+    for (const auto& [name, r] : s["items"].items()) {
+        if (name.starts_with("param:") || name.starts_with("output:") || name == "expert") continue;  // may be scrolled
+        EXPECT_GE(r[0].get<double>(), 0) << name;
+        EXPECT_GE(r[1].get<double>(), 0) << name;
+        EXPECT_LE(r[2].get<double>(), 2560) << name;
+        EXPECT_LE(r[3].get<double>(), 1440) << name;
+    }
+    keep(editor.screenshot(), "large-2560x1440");
+    editor.key("F1");
+    editor.with("help");
+    keep(editor.screenshot(), "help");
+}
+
+}  // namespace
+}  // namespace voxloom
