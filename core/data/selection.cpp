@@ -1,5 +1,7 @@
 #include "core/data/selection.h"
 
+#include <cmath>
+
 #include "core/base/error.h"
 
 namespace voxloom {
@@ -26,6 +28,18 @@ Box fine_box_of_octant(const BricksDesc& bricks, BrickId id, int octant) {
     const Index3 lo = (Index3(id.index) * Index3(halves) + Index3(upper)) * size;
     const Box box{lo, glm::min(lo + size, bricks.volume.dims)};
     return box.empty() ? Box{} : box;
+}
+
+glm::dvec3 point_in_box(const VolumeDesc& volume, glm::dvec3 fraction) {
+    const SamplingBox box = sampling_box(volume);
+    return glm::dvec3(volume.index_to_world * glm::dvec4(glm::mix(box.lo, box.hi, fraction), 1.0));
+}
+
+glm::dvec4 plane_through(glm::dvec3 point, glm::dvec3 normal) {
+    const double length = glm::length(normal);
+    if (!(length > 0) || !std::isfinite(length)) fail("a cutting plane's normal must have a length");
+    normal /= length;
+    return {normal, -glm::dot(normal, point)};
 }
 
 }  // namespace voxloom

@@ -53,4 +53,9 @@ void check_selection(const Selection& selection, const BricksDesc& bricks);
 // Voxels of level 0 that an octant of a brick stands for, as fine_box_of; empty where it has none.
 Box fine_box_of_octant(const BricksDesc& bricks, BrickId id, int octant);
 
+// A point of a volume's sampling box, (0, 0, 0) to (1, 1, 1), in the world.
+glm::dvec3 point_in_box(const VolumeDesc& volume, glm::dvec3 fraction);
+// The world plane through a point with a normal of any length but 0, as Selection::plane.
+glm::dvec4 plane_through(glm::dvec3 point, glm::dvec3 normal);
+
 }  // namespace voxloom
