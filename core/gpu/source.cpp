@@ -36,22 +36,9 @@ int slices_at_a_time(glm::ivec3 dims, std::size_t texel_bytes) {
     return int(std::clamp(double(32u << 20) / std::max(slice, 1.0), 1.0, double(std::max(dims.z, 1))));
 }
 
-struct Layout {
-    int channels = 1;       // of the texture
-    int from = 0;           // first component
-    bool wide = false;      // float instead of 16-bit integer texels
-    bool validity = false;
-    double offset = 0, scale = 1;
-};
-
-GLenum format_of(const Layout& l) {
-    if (l.wide) return l.channels == 1 ? GL_R32F : l.channels == 2 ? GL_RG32F : GL_RGBA32F;
-    return l.channels == 1 ? GL_R16 : l.channels == 2 ? GL_RG16 : GL_RGBA16;
-}
-
 // Voxels [begin, end) to texels, in double before rounding.
 template <class T, class Out>
-void convert(const T* voxels, const std::uint8_t* mask, int components, const Layout& l,
+bool convert(const T* voxels, const std::uint8_t* mask, int components, const TexelLayout& l,
              std::size_t begin, std::size_t end, Out* out) {
     const double to_unit = 1.0 / l.scale;
     auto quantise = [](double u) {
@@ -62,18 +49,22 @@ void convert(const T* voxels, const std::uint8_t* mask, int components, const La
     };
     out += begin * std::size_t(l.channels);
     const int values = l.validity ? l.channels - 1 : l.channels;
+    bool found = false;  // one that is not finite
     for (std::size_t i = begin; i < end; ++i) {
         const T* v = voxels + i * std::size_t(components) + l.from;
         bool valid = !mask || mask[i];
         if constexpr (std::is_floating_point_v<T>)
-            for (int c = 0; c < std::min(values, components - l.from); ++c)
+            for (int c = 0; c < std::min(values, components - l.from); ++c) {
+                found = found || !std::isfinite(v[c]);
                 valid = valid && std::isfinite(v[c]);
+            }
         for (int c = 0; c < values; ++c) {
             double value = c < components - l.from ? (double(v[c]) - l.offset) * to_unit : 1.0;
             *out++ = valid ? quantise(value) : Out(0);
         }
         if (l.validity) *out++ = quantise(valid ? 1.0 : 0.0);
     }
+    return found;
 }
 
 template <class T>
@@ -102,6 +93,50 @@ std::optional<FieldSource> provided_source(const Value& value, const SourceReque
     return std::nullopt;
 }
 
+GLenum TexelLayout::internal_format() const {
+    if (wide) return channels == 1 ? GL_R32F : channels == 2 ? GL_RG32F : GL_RGBA32F;
+    return channels == 1 ? GL_R16 : channels == 2 ? GL_RG16 : GL_RGBA16;
+}
+
+GLenum TexelLayout::format() const {
+    const GLenum formats[] = {GL_RED, GL_RG, GL_RGB, GL_RGBA};
+    return formats[channels - 1];
+}
+
+TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity) {
+    TexelLayout l;
+    l.wide = bytes_of(desc.type) > 2;
+    l.validity = validity && !desc.color;
+    l.from = desc.color ? 0 : component;
+    l.channels = desc.color ? 4 : l.validity ? 2 : 1;
+    if (desc.color) {
+        // Fractions of the type's maximum; floats are fractions as they are.
+        l.scale = is_float(desc.type) ? 1.0 : limits_of(desc.type).second;
+    } else if (l.wide) {
+        l.offset = range.min;
+        l.scale = range.max > range.min ? range.max - range.min : 1.0;
+        if (!std::isfinite(l.scale))
+            fail("the values of this volume span more than a double can hold");
+    } else {
+        // Every integer has its own texel: 8-bit values times 257; signed ones from the smallest on, as
+        // small texels are interpolated with small absolute error.
+        auto [lo, hi] = limits_of(desc.type);
+        l.offset = lo < 0 ? std::clamp(range.min, lo, hi) : lo;
+        l.scale = hi - lo;
+    }
+    return l;
+}
+
+bool to_texels(const std::byte* voxels, const std::uint8_t* mask, const VolumeDesc& desc,
+               const TexelLayout& l, std::size_t begin, std::size_t end, std::byte* texels) {
+    return with_type(desc.type, [&](auto t) {
+        auto v = reinterpret_cast<const decltype(t)*>(voxels);
+        return l.wide ? convert(v, mask, desc.components, l, begin, end, reinterpret_cast<float*>(texels))
+                      : convert(v, mask, desc.components, l, begin, end,
+                                reinterpret_cast<std::uint16_t*>(texels));
+    });
+}
+
 const Module& dense_module() { return kDense; }
 
 void check_fits_texture(const VolumeDesc& desc) {
@@ -118,10 +153,8 @@ VoxelSource upload_dense(const Volume& volume, int component, const std::stop_to
     const glm::ivec3 dims(desc.dims);
     check_fits_texture(desc);
 
-    Layout l;
-    l.wide = bytes_of(desc.type) > 2;
-    l.validity = desc.has_mask;
-    if (is_float(desc.type) && !l.validity) {
+    bool validity = desc.has_mask;
+    if (is_float(desc.type) && !validity) {
         with_type(desc.type, [&](auto t) {
             using T = decltype(t);
             std::atomic<bool> found = false;
@@ -131,37 +164,18 @@ VoxelSource upload_dense(const Volume& volume, int component, const std::stop_to
                                                           std::size_t(hi - lo)))
                                  found = true;
                          }, stop);
-            l.validity = found;
+            validity = found;
         });
     }
-    // Colour with invalid voxels keeps no room for validity: they are black and, where there is an
-    // alpha, transparent.
-    l.from = desc.color ? 0 : component;
-    if (desc.color) l.validity = false;
-    l.channels = desc.color ? 4 : l.validity ? 2 : 1;
-
-    if (desc.color) {
-        // Fractions of the type's maximum; floats are fractions as they are.
-        l.scale = is_float(desc.type) ? 1.0 : limits_of(desc.type).second;
-    } else if (l.wide) {
-        ValueRange range = value_range(volume, stop);
-        l.offset = range.min;
-        l.scale = range.max > range.min ? range.max - range.min : 1.0;
-        if (!std::isfinite(l.scale))
-            fail("the values of this volume span more than a double can hold");
-    } else {
-        // Every integer has its own texel: 8-bit values times 257; signed ones from the smallest on, as
-        // small texels are interpolated with small absolute error.
-        auto [lo, hi] = limits_of(desc.type);
-        l.offset = lo < 0 ? std::clamp(value_range(volume, stop).min, lo, hi) : lo;
-        l.scale = hi - lo;
-    }
+    const bool by_range = !desc.color && (bytes_of(desc.type) > 2 || limits_of(desc.type).first < 0);
+    const TexelLayout l = texel_layout(desc, component, by_range ? value_range(volume, stop) : ValueRange{},
+                                       validity);
 
     auto texture = std::make_shared<Texture>(
-        make_texture(GL_TEXTURE_3D, format_of(l), dims, GL_LINEAR, "the volume"));
+        make_texture(GL_TEXTURE_3D, l.internal_format(), dims, GL_LINEAR, "the volume"));
     const std::size_t slice = std::size_t(dims.x) * std::size_t(dims.y);
-    const int step = slices_at_a_time(dims, std::size_t(l.channels) * (l.wide ? 4 : 2));
-    Buffer staging(slice * std::size_t(step) * std::size_t(l.channels) * (l.wide ? 4 : 2), "upload");
+    const int step = slices_at_a_time(dims, l.bytes());
+    Buffer staging(slice * std::size_t(step) * l.bytes(), "upload");
     Buffer mask;
     if (desc.has_mask) mask = Buffer(slice * std::size_t(step), "mask");
     for (int z = 0; z < dims.z; z += step) {
@@ -170,23 +184,12 @@ VoxelSource upload_dense(const Volume& volume, int component, const std::stop_to
         if (desc.has_mask)
             volume.read_mask({{0, 0, z}, {dims.x, dims.y, z + n}},
                              mask.as<std::uint8_t>().subspan(0, count));
-        with_type(desc.type, [&](auto t) {
-            using T = decltype(t);
-            auto voxels = reinterpret_cast<const T*>(data) +
-                          slice * std::size_t(z) * std::size_t(desc.components);
-            auto valid = desc.has_mask ? mask.as<std::uint8_t>().data() : nullptr;
-            parallel_for(0, std::int64_t(count), 1 << 16, [&](std::int64_t lo, std::int64_t hi) {
-                if (l.wide)
-                    convert(voxels, valid, desc.components, l, std::size_t(lo), std::size_t(hi),
-                            staging.as<float>().data());
-                else
-                    convert(voxels, valid, desc.components, l, std::size_t(lo), std::size_t(hi),
-                            staging.as<std::uint16_t>().data());
-            }, stop);
-        });
-        const GLenum channels[] = {GL_RED, GL_RG, GL_RGB, GL_RGBA};
-        upload(*texture, {0, 0, z}, {dims.x, dims.y, n}, channels[l.channels - 1],
-               l.wide ? GL_FLOAT : GL_UNSIGNED_SHORT, staging.data());
+        const std::byte* voxels = data + slice * std::size_t(z) * desc.voxel_bytes();
+        const std::uint8_t* valid = desc.has_mask ? mask.as<std::uint8_t>().data() : nullptr;
+        parallel_for(0, std::int64_t(count), 1 << 16, [&](std::int64_t lo, std::int64_t hi) {
+            to_texels(voxels, valid, desc, l, std::size_t(lo), std::size_t(hi), staging.data());
+        }, stop);
+        upload(*texture, {0, 0, z}, {dims.x, dims.y, n}, l.format(), l.type(), staging.data());
     }
     check_errors("uploading the volume");
     bytes += texture->bytes;

@@ -54,12 +54,34 @@ void register_source_provider(std::string name, SourceProvider provider);
 // The first provider's answer, in order of name. [OpenGL thread]
 std::optional<FieldSource> provided_source(const Value& value, const SourceRequest& request);
 
+// How voxels become texels. Integers of up to 16 bits keep every value exactly in R16; wider types and
+// floats become R32F over a range, mapped in double. Voxels that are not finite or not valid take a
+// second channel where there is one, and are 0.
+struct TexelLayout {
+    int channels = 1;       // of the texture
+    int from = 0;           // first component
+    bool wide = false;      // float instead of 16-bit integer texels
+    bool validity = false;
+    double offset = 0, scale = 1;
+
+    GLenum internal_format() const;
+    GLenum format() const;
+    GLenum type() const { return wide ? GL_FLOAT : GL_UNSIGNED_SHORT; }
+    std::size_t bytes() const { return std::size_t(channels) * (wide ? 4 : 2); }
+};
+// `range` is that of the values, used where the type alone does not say. Throws Error where it is more
+// than a double can hold. Colours have no room for validity: invalid voxels are black and, where there
+// is an alpha, transparent.
+TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity);
+// Voxels [begin, end) of a dense array of desc.type to texels; mask may be null. True when one of them
+// is not finite.
+bool to_texels(const std::byte* voxels, const std::uint8_t* mask, const VolumeDesc& desc,
+               const TexelLayout& layout, std::size_t begin, std::size_t end, std::byte* texels);
+
 // Throws Error when a volume exceeds what one 3-D texture can hold here.
 void check_fits_texture(const VolumeDesc& desc);
 
-// The dense one: a volume in one 3-D texture. Integers of up to 16 bits keep every value exactly in
-// R16; wider types and floats become R32F over their finite range, mapped in double. Voxels that are
-// not finite or not valid take a second channel. `bytes` receives what was uploaded.
+// The dense one: a volume in one 3-D texture. `bytes` receives what was uploaded.
 // Throws Error when the volume exceeds the driver's limits. [OpenGL thread]
 VoxelSource upload_dense(const Volume& volume, int component, const std::stop_token& stop,
                          std::uint64_t& bytes);

@@ -35,6 +35,11 @@ class Keep {
         return thing;
     }
 
+    // Forgets one thing; it dies when nobody holds it any more.
+    void drop(const std::shared_ptr<const void>& owner, const Hash& key) {
+        entries_.remove_if([&](const Entry& e) { return e.key == key && same_owner(e.owner, owner); });
+    }
+
     // Drops what is over the limit or has lost its owner.
     void shrink(std::uint64_t byte_limit) {
         entries_.remove_if([](const Entry& e) { return e.owner.expired(); });

@@ -10,6 +10,7 @@
 #include "core/gpu/source.h"
 #include "core/gpu/thread.h"
 #include "plugins/render-slicer/blocks.h"
+#include "plugins/render-slicer/brick_scene.h"
 #include "plugins/render-slicer/keep.h"
 #include "plugins/render-slicer/modules.h"
 #include "plugins/render-slicer/tables.h"
@@ -86,8 +87,11 @@ VolumePtr dense(const Value& source, const std::shared_ptr<const void>& owner, E
 struct Prepared {
     VolumePtr volume;
     std::shared_ptr<const gpu::FieldSource> field;
+    std::optional<BrickScene> bricks;  // in place of the volume and its blocks
     std::shared_ptr<const BlockRanges> blocks;
     Hash blocks_key;
+    glm::vec3 block_size{1.0f};     // index coordinates
+    glm::ivec3 block_grid{0};
     ValueRange range;               // of the tables; covers what reconstruction can give
     TexturePtr occupancy;           // null: nothing to leap over
     TexturePtr ceiling;             // for maxima: the largest u of every block
@@ -138,6 +142,14 @@ double smoothing_side(S::Gradient g) {
     return g == S::Gradient::central ? 0.0 : g == S::Gradient::sobel ? 0.25 : 1.0 / 6.0;
 }
 
+// Whether anything with values between lo and hi is seen, where none is below `least`.
+bool is_visible(const Scene& scene, double least, double lo, double hi) {
+    const S& s = scene.settings;
+    if (s.compositing == S::Compositing::isosurface) return lo <= s.iso_value && s.iso_value <= hi;
+    // Below a value up to which all is transparent, no maximum is seen.
+    return scene.transfer->max_extinction(s.compositing == S::Compositing::mip ? least : lo, hi) > 0;
+}
+
 // Which blocks can be seen, and how far to leap where they cannot.
 void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner, Prepared& p,
                     Evaluation& ev) {
@@ -159,9 +171,7 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
             for (std::size_t i = 0; i < seen.size(); ++i) {
                 const glm::dvec2 r(p.blocks->ranges[i]);
                 if (r.x > r.y) continue;  // no valid voxel
-                // Below a value up to which all is transparent, no maximum is seen.
-                seen[i] = iso ? r.x <= s.iso_value && s.iso_value <= r.y
-                              : tf.max_extinction(mip ? p.blocks->all.min : r.x, r.y) > 0;
+                seen[i] = is_visible(scene, p.blocks->all.min, r.x, r.y);
                 out->seen += seen[i];
             }
             if (out->seen == 0) return out;
@@ -175,21 +185,54 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
         });
     p.occupancy = kept->texture;
     p.seen = kept->seen;
+    p.block_size = glm::vec3(float(p.blocks->size));
+    p.block_grid = p.blocks->grid;
     ev.count("blocks", double(p.blocks->count()));
     ev.count("blocks drawn", double(p.seen));
     ev.count("blocks skipped (transparent)", double(p.blocks->count() - p.seen));
 }
 
-Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<const void>& owner,
-                 Evaluation& ev) {
+// Voxels of neighbours around a brick, so that its own are enough for what is drawn.
+Apron apron_for(const Scene& scene) {
+    const bool wide = uses_gradient(scene) || scene.settings.reconstruction == S::Reconstruction::tricubic;
+    return wide ? Apron{1, 2} : Apron{0, 1};
+}
+
+// Bricks in place of a volume.
+void prepare_bricks(const Scene& scene, Evaluation& ev, Prepared& p) {
     const S& s = scene.settings;
-    const TransferFunction& tf = *scene.transfer;
+    const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
+    if (s.classification == S::Classification::pre && is_slabs(s) && !scene.transfer->two)
+        fail("bricks are not classified before they are interpolated; choose classification post or pre-integrated, "
+             "or draw a decoded volume");
+    BrickRequest request;
+    request.component = s.component;
+    request.apron = apron_for(scene);
+    request.gpu_bytes = s.gpu_bytes;
+    request.visible = [&](double least, double lo, double hi) {
+        if (cubic && lo < hi) {
+            const double middle = 0.5 * lo + 0.5 * hi, half = kCubicOvershoot * (0.5 * hi - 0.5 * lo);
+            lo = middle - half;
+            hi = middle + half;
+        }
+        return is_visible(scene, least, lo, hi);
+    };
+    p.bricks = slicer::prepare_bricks(std::get<BricksPtr>(scene.source), scene.selection.get(), request, ev);
+    p.field = p.bricks->field;
+    p.range = p.bricks->range;
+    p.occupancy = p.bricks->occupancy;
+    p.seen = p.bricks->seen;
+    p.block_size = p.bricks->block_size;
+    p.block_grid = p.bricks->blocks;
+}
+
+void prepare_volume(const Scene& scene, const View& view, const std::shared_ptr<const void>& owner,
+                    Evaluation& ev, Prepared& p) {
+    const S& s = scene.settings;
     Keep& keep = Keep::instance();
-    Prepared p;
     p.volume = dense(scene.source, owner, ev);
     const Volume& volume = *p.volume;
     const VolumeDesc& desc = volume.desc();
-    const glm::ivec3 dims(desc.dims);
     const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
 
     p.blocks_key = key("ranges", s.component, s.block_size, cubic, view.square_reach());
@@ -202,7 +245,7 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
             return b;
         });
     find_occupancy(scene, owner, p, ev);
-    if (p.seen == 0) return p;
+    if (p.seen == 0) return;
 
     p.range = p.blocks->all;
 
@@ -217,6 +260,20 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
             ev.count("bytes uploaded", double(bytes));
             return field;
         });
+}
+
+Prepared prepare(const Scene& scene, const View& view, const VolumeDesc& desc, bool as_bricks,
+                 const std::shared_ptr<const void>& owner, Evaluation& ev) {
+    const S& s = scene.settings;
+    const TransferFunction& tf = *scene.transfer;
+    Keep& keep = Keep::instance();
+    Prepared p;
+    if (as_bricks)
+        prepare_bricks(scene, ev, p);
+    else
+        prepare_volume(scene, view, owner, ev, p);
+    if (p.seen == 0) return p;
+    const glm::ivec3 dims(desc.dims);
     const gpu::VoxelSource& voxels = p.field->voxels;
     if (p.range.min == p.range.max) {
         // A constant volume: a narrow range around its value, which then lies in the middle of the table.
@@ -224,11 +281,11 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
         p.range = {p.range.min - w, p.range.max + w};
     }
 
-    if (uses_gradient(scene) && s.gradient_stored && !p.field->own_kernels)
+    if (uses_gradient(scene) && s.gradient_stored && !p.field->own_kernels && !p.bricks)
         p.gradient = keep.get<Prepared::Stored>(
             owner, key("gradient", s.gradient, desc.color ? -1 : s.component), [&](std::uint64_t& bytes) {
                 ev.progress(0.6, "computing gradients");
-                Gradients g(volume, s.component, voxels.offset, voxels.scale, smoothing_side(s.gradient));
+                Gradients g(*p.volume, s.component, voxels.offset, voxels.scale, smoothing_side(s.gradient));
                 float largest = g.largest(ev.stop());
                 float inverse = largest > 0 ? 1 / largest : 0;
                 auto t = gpu::upload_computed(
@@ -242,7 +299,7 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
                 return std::make_shared<Prepared::Stored>(Prepared::Stored{t, largest});
             });
 
-    if (s.compositing == S::Compositing::mip && s.skipping)
+    if (s.compositing == S::Compositing::mip && s.skipping && p.blocks)
         p.ceiling = keep.get<KeptTexture>(
             owner, key("ceiling", p.blocks_key, {}), [&](std::uint64_t& bytes) {
                 std::vector<float> largest;
@@ -271,17 +328,25 @@ Prepared prepare(const Scene& scene, const View& view, const std::shared_ptr<con
                 auto t = gpu::upload_computed(
                     dims, GL_RGBA32F, "the classified volume",
                     [&](int z, glm::vec4* out) {
-                        classify_slice(volume, s.component, tf.one, d, z, out);
+                        classify_slice(*p.volume, s.component, tf.one, d, z, out);
                     }, ev.stop());
                 bytes += t->bytes;
                 ev.count("bytes uploaded", double(t->bytes));
                 return std::make_shared<KeptTexture>(KeptTexture{t});
             })->texture;
     } else if (slabs && s.classification == S::Classification::pre_integrated) {
-        p.slabs = keep_table(scene.transfer, key("slabs", tables, key("", s.table_size)), ev,
-                             GL_TEXTURE_2D, glm::ivec2(s.table_size), [&] {
-                                 return preintegrated_table(tf.one, p.range, s.table_size, d, ev.stop());
-                             });
+        // One table a slice distance, one below the other.
+        const int layers = p.bricks ? p.bricks->steps : 1;
+        p.slabs = keep_table(
+            scene.transfer, key("slabs", tables, key("", s.table_size, layers)), ev, GL_TEXTURE_2D,
+            {s.table_size, s.table_size * layers}, [&] {
+                std::vector<glm::vec4> all;
+                for (int layer = 0; layer < layers; ++layer) {
+                    const auto one = preintegrated_table(tf.one, p.range, s.table_size, std::ldexp(d, layer), ev.stop());
+                    all.insert(all.end(), one.begin(), one.end());
+                }
+                return all;
+            });
         if (has_narrow_peak(tf.one, p.range, s.table_size))
             p.integral = keep_table(scene.transfer, key("integral", tables, {}), ev, GL_TEXTURE_1D, {kIntegralNodes, 1},
                                     [&] { return depth_integral(tf.one, p.range, kIntegralNodes, d); });
@@ -374,6 +439,14 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
     choose(shading, "SHADING");
     choose(modulation, "MODULATION");
     choose(lighting.at_eye, "EYE_LIGHT");
+    choose(p.bricks && p.bricks->blended, "BLENDED");
+    choose(p.bricks && p.bricks->steps > 1, "STEPS");
+    choose(p.bricks && p.slabs, "LEVEL_TABLES");
+    // Planes to the next slice, index steps to the next voxel, the way to a plane's voxels.
+    choices += p.bricks ? "#define PLANE_STEP page_step\n#define VOXEL_STEP (1.0 / page_scale)\n"
+                          "#define VISIT(m) open_page(ray_at(m))\n#define MARCH march_bricks\n"
+                        : "#define PLANE_STEP 1.0\n#define VOXEL_STEP vec3(1.0)\n#define VISIT(m)\n"
+                          "#define MARCH march\n";
     choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", lighting.place.size(),
                            smoothing_side(s.gradient));
 
@@ -381,7 +454,10 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
                              "reconstruction-tricubic"};
     const Module kernel = module(kernels[int(s.reconstruction)]);
     std::vector<Module> parts = {{"choices", choices}, module("ray"), voxels.glsl};
-    if (!p.field->own_kernels) {
+    if (p.bricks) {
+        parts.push_back(over(kernel, "brick"));
+        parts.push_back(module("reconstruction-bricks"));
+    } else if (!p.field->own_kernels) {
         if (!voxels.linear) parts.push_back(module("linear-from-voxels"));
         parts.push_back(kernel);
     }
@@ -420,16 +496,17 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
                                                                      : "compositing-x-ray"));
         parts.push_back(module(shading || modulation ? "march-slabs-late" : "march-slabs"));
     }
+    if (p.bricks) parts.push_back(module("march-bricks"));
     parts.push_back(module("view-aligned"));
     return gpu::program({module("proxy-screen")}, parts);
 }
 
-void set_uniforms(const gpu::Program& program, const Scene& scene, const View& view, const Prepared& p,
-                  const Lighting& lighting) {
+void set_uniforms(const gpu::Program& program, const Scene& scene, const View& view,
+                  const VolumeDesc& desc, const Prepared& p, const Lighting& lighting) {
     const S& s = scene.settings;
     const gpu::VoxelSource& voxels = p.field->voxels;
-    const VolumeDesc& desc = p.volume->desc();
     view.set(program);
+    if (p.bricks) p.bricks->set(program);
 
     int unit = 0;
     for (const gpu::SourceTexture& t : voxels.textures) program.bind(t.sampler.c_str(), unit++, *t.texture);
@@ -479,8 +556,8 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
     if (s.skipping && p.occupancy) {
         program.bind("occupancy", unit++, *p.occupancy);
         if (p.ceiling) program.bind("ceiling", unit++, *p.ceiling);
-        program.set("block_size", float(p.blocks->size));
-        program.set("block_last", p.blocks->grid - 1);
+        program.set("block_size", p.block_size);
+        program.set("block_last", p.block_grid - 1);
     }
     program.set("saturated", float(1 - s.early_termination));
     program.set("iso_level", float((s.iso_value - p.range.min) / extent));
@@ -608,6 +685,14 @@ ImagePtr only_background(const S& s) {
     return image;
 }
 
+// Whether one texture can hold the volume, and gpu_memory, or at least a gigabyte, has room for it.
+bool fits_as_volume(const VolumeDesc& desc, std::uint64_t gpu_bytes) {
+    const int limit = gpu::context_info().max_texture_3d;
+    const double texels = double(desc.voxels()) * (bytes_of(desc.type) > 2 ? 4 : 2) * (desc.color ? 4 : 1);
+    return desc.dims.x <= limit && desc.dims.y <= limit && desc.dims.z <= limit &&
+           texels <= std::max(double(gpu_bytes), double(1 << 30));
+}
+
 }  // namespace
 
 ImagePtr render(const Scene& scene, Evaluation& ev) {
@@ -625,7 +710,10 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
     if (s.component >= desc.components)
         fail("component {} is asked for, but the volume has {}", s.component, desc.components);
 
-    gpu::check_fits_texture(desc);
+    // Bricks of which a view takes a part; all of level 0 is drawn as a volume where it fits.
+    const bool as_bricks = std::holds_alternative<BricksPtr>(scene.source) &&
+                           (scene.selection || !fits_as_volume(desc, s.gpu_bytes));
+    if (!as_bricks) gpu::check_fits_texture(desc);
 
     View view(*scene.camera, desc, s.size, s.slice_distance);
     if (view.planes > kMostPlanes) {
@@ -635,15 +723,16 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
         view = View(*scene.camera, desc, s.size, coarser);
     }
     ev.count("slices", std::ceil(view.planes));
+    if (as_bricks) view.limit_reach(Atlas::kReach - (s.reconstruction == S::Reconstruction::tricubic));
 
-    Prepared prepared = prepare(scene, view, owner, ev);
+    Prepared prepared = prepare(scene, view, desc, as_bricks, owner, ev);
     if (prepared.seen == 0) {
         Keep::instance().shrink(s.gpu_bytes);
         return only_background(s);
     }
     const Lighting lighting(scene, view);
     gpu::ProgramPtr program = assemble(scene, prepared, lighting);
-    set_uniforms(*program, scene, view, prepared, lighting);
+    set_uniforms(*program, scene, view, desc, prepared, lighting);
 
     if (ev.wants_provisional() && s.size.x * s.size.y > 128 * 128) {
         Target coarse(glm::max(s.size / 4, glm::ivec2(1)));

@@ -37,6 +37,7 @@ struct Settings {
 
 struct Scene {
     Value source;               // Volume or Bricks
+    SelectionPtr selection;     // of the bricks that are drawn; null: all of level 0
     TransferPtr transfer;
     CameraPtr camera;
     LightsPtr lights;           // null: the default ones

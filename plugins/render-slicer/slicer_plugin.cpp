@@ -54,12 +54,19 @@ void describe(Description& d) {
     if (volume->color) texel *= 4;
     if (p.boolean("shading")) texel += 8;
     if (p.text("classification") == "pre") texel += 16;
+    if (d.input("selection")) {
+        if (source->type != PortType::bricks)
+            d.problem("a selection says which bricks are drawn, but the source has none; wire the bricks that it was "
+                      "made of", "selection");
+        return;  // as much as gpu_memory allows
+    }
     d.working_memory(volume->voxels() * texel + (source->by_region ? volume->dense_bytes() : 0));
 }
 
 void evaluate(Evaluation& ev) {
     Scene scene;
     scene.source = ev.value("source");
+    scene.selection = ev.input<Selection>("selection");
     scene.transfer = ev.input<TransferFunction>("transfer");
     scene.camera = ev.input<Camera>("camera");
     scene.lights = ev.input<Lights>("lights");
@@ -78,6 +85,7 @@ NodeType render_node() {
     t.inputs = {{"source", {PortType::volume, PortType::bricks}, "What is drawn."},
                 {"transfer", PortType::transfer, "Opacity and colour of its values."},
                 {"camera", PortType::camera, "Where it is seen from."},
+                {"selection", PortType::selection, "Which of the bricks are drawn, at which level; all at the finest one where none is wired.", true},
                 {"lights", PortType::lights, "Lights for shading; a headlight where none is wired.", true}};
     t.outputs = {{"image", PortType::image, "The picture, premultiplied linear RGBA."}};
 

@@ -27,6 +27,12 @@ struct View {
     // rays are from the one through the middle; whole numbers, as blocks are widened by them.
     int square = 1;
     int square_reach() const { return reach_; }
+    // Pixels leap each on its own where their squares would reach further than this.
+    void limit_reach(int most) {
+        if (reach_ <= most) return;
+        square = 1;
+        reach_ = 0;
+    }
 
     // For shading: world axes, lengths in units of the volume's diagonal, from its middle.
     glm::dmat3 index_to_place, gradient_to_world;

@@ -13,6 +13,13 @@ float integral_at(float u) { return texture(depth_integral, clamp(u, 0.0, 1.0) *
 #else
 #define INTEGRAL(u)
 #endif
+#ifdef LEVEL_TABLES
+// One table a slice distance, one below the other.
+uniform float table_layers;
+vec2 slab_place(vec2 at) { return vec2(at.x, (at.y + page_layer) / table_layers); }
+#else
+vec2 slab_place(vec2 at) { return at; }
+#endif
 #ifdef COLOR
 #define TEXEL(t) , clamp(t, 0.0, 1.0)
 #else
@@ -39,10 +46,10 @@ vec4 slab(Sample f, Sample b) {
     u = mix(u.yx, u, vec2(f.scalar.y, b.scalar.y));
 #endif
     u = clamp(u, 0.0, 1.0);
-    vec4 e = texture(slab_table, u * slab_map.x + slab_map.y);
+    vec4 e = texture(slab_table, slab_place(u * slab_map.x + slab_map.y));
 #ifdef NARROW_PEAKS
     float across = u.y - u.x;
-    if (abs(across) > kCancels) e *= (b.integral - f.integral) / across / max(e.a, 1e-30);
+    if (abs(across) > kCancels) e *= PLANE_STEP * (b.integral - f.integral) / across / max(e.a, 1e-30);
 #endif
 #ifdef VALIDITY
     e *= 0.5 * (f.scalar.y + b.scalar.y);

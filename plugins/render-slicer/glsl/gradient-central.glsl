@@ -15,7 +15,8 @@ vec3 gradient(vec3 p) {
     vec3 g;
     for (int a = 0; a < 3; ++a) {
         vec3 e = vec3(a == 0, a == 1, a == 2);
+        e *= VOXEL_STEP;
         g[a] = 0.5 * (level_at(p + e, c) - level_at(p - e, c));
     }
-    return g;
+    return g / VOXEL_STEP;
 }

@@ -18,7 +18,7 @@ vec3 gradient(vec3 p) {
             for (int x = -1; x <= 1; ++x) {
                 vec3 o = vec3(x, y, z);
                 vec3 w = mix(vec3(1.0 - 2.0 * SIDE), vec3(SIDE), abs(o));
-                g += 0.5 * o * w.yzx * w.zxy * level_at(p + o, c);
+                g += 0.5 * o * w.yzx * w.zxy * level_at(p + o * VOXEL_STEP, c);
             }
-    return g;
+    return g / VOXEL_STEP;
 }

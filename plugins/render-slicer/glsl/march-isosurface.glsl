@@ -10,7 +10,7 @@ void march(float k, float end) {
     float m = on_ray(k);
     Sample front = observe(ray_at(m));
     while (k < end && !finished()) {
-        k += kPart;
+        k += kPart * PLANE_STEP;
         float next = on_ray(k);
         Sample back = observe(ray_at(next));
         bool crosses = (front.scalar.x < iso_level) != (back.scalar.x < iso_level) &&

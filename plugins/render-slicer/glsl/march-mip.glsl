@@ -17,12 +17,13 @@ void look(float m) {
 void march(float k, float end) {
     look(on_ray(k));
     while (k < end) {
-        k += 1.0;
+        k += PLANE_STEP;
         look(on_ray(k));
     }
 }
 vec4 picture() {
     if (largest <= -1.0) return vec4(0.0);
+    VISIT(largest_at);
     vec3 p = ray_at(largest_at);
 #ifdef GRADIENT
     vec3 g = world_gradient(p);

@@ -9,7 +9,7 @@ void march(float k, float end) {
     while (k < end && !finished()) {
         bool seen = false;
         while (k < end && !seen) {
-            k += 1.0;
+            k += PLANE_STEP;
             from = m;
             front = back;
             m = on_ray(k);

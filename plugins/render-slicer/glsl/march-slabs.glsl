@@ -3,7 +3,7 @@ void march(float k, float end) {
     float m = on_ray(k);
     Sample front = observe(ray_at(m));
     while (k < end && !finished()) {
-        k += 1.0;
+        k += PLANE_STEP;
         float next = on_ray(k);
         Sample back = observe(ray_at(next));
         add_slab(slab(front, back), (next - m) * slab_length);

@@ -13,7 +13,7 @@ uniform float square;                // pixels on its side
 uniform float square_reach;          // index units
 #ifdef SKIPPING
 uniform isampler3D occupancy;        // n > 0: all blocks nearer than n are seen; n < 0: none of them is
-uniform float block_size;
+uniform vec3 block_size;
 uniform ivec3 block_last;
 #ifdef CEILING
 uniform sampler3D ceiling;           // largest u of every block
@@ -49,7 +49,7 @@ void main() {
     bvec3 across = lessThan(abs(direction), vec3(1e-20));
     vec3 inverse = 1.0 / mix(direction, vec3(1.0), across);
     vec3 far_side = vec3(greaterThan(direction, vec3(0.0)));
-    float inverse_size = 1.0 / block_size;
+    vec3 inverse_size = 1.0 / block_size;
     while (k < end && !finished()) {
         // Leap while nothing near is seen, each time to the last plane of what is known of.
         float stop = k;
@@ -70,11 +70,11 @@ void main() {
             stop = next > k ? next : max(n > 0 ? ceil(out_at) : k, k + 1.0);
             k = next > k ? next : k;
         }
-        if (k < end) march(k, stop);
+        if (k < end) MARCH(k, stop);
         k = stop;
     }
 #else
-    if (k < end) march(k, end);
+    if (k < end) MARCH(k, end);
 #endif
     vec4 c = picture();
     pixel_color = c + (1.0 - c.a) * background;

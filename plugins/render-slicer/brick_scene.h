@@ -1,0 +1,49 @@
+// What is drawn of Bricks: which brick is seen where, and all of it on the GPU.
+//
+// Space is a grid of cells, each as large as the smallest thing drawn: a brick, or an octant of one that
+// finer bricks have replaced in part. A cell names a page, the brick or the octant that it lies in, or
+// none; a page says where its brick lies in the atlas, what it blends into, and how far apart its slices
+// are. So a ray walks from page to page, and a fragment draws all of them.
+#pragma once
+
+#include "core/data/selection.h"
+#include "core/gpu/source.h"
+#include "plugins/render-slicer/atlas.h"
+#include "plugins/render-slicer/view.h"
+
+namespace voxloom {
+class Evaluation;
+}
+
+namespace voxloom::slicer {
+
+struct BrickScene {
+    std::shared_ptr<const gpu::FieldSource> field;  // fetch_voxel and sample_linear with the prefix brick_
+    ValueRange range;                // of every value that any brick can hold
+    gpu::TexturePtr occupancy;       // as for a dense volume; null: nothing is seen
+    glm::vec3 block_size{1.0f};      // index coordinates
+    glm::ivec3 blocks{0};
+    std::size_t seen = 0;            // blocks
+    glm::vec3 cell_size{1.0f};       // index coordinates
+    glm::ivec3 cells{0};
+    glm::vec3 brick_size{1.0f};      // voxels of a brick
+    glm::vec3 slot_lo{0.0f}, slot_hi{0.0f};  // of a brick's voxels in its slot, from its first own one
+    bool blended = false;            // some page mixes in its parent
+    int steps = 1;                   // slices of pages are 1, 2, ... 2^(steps-1) planes apart
+
+    void set(const gpu::Program& program) const;
+};
+
+struct BrickRequest {
+    int component = 0;
+    Apron apron;
+    // Whether anything with values between lo and hi is seen, where none is below `least`.
+    std::function<bool(double least, double lo, double hi)> visible;
+    std::uint64_t gpu_bytes = 0;     // that the atlas may take
+};
+
+// selection null: everything at level 0. [OpenGL thread]
+BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request,
+                          Evaluation& ev);
+
+}  // namespace voxloom::slicer

@@ -1,0 +1,349 @@
+// Bricks drawn by selection: against the volume that they are of, and against closed forms.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/data/brick_cache.h"
+#include "core/data/dense_pyramid.h"
+#include "core/data/selection.h"
+#include "core/plugin/plugin.h"
+#include "tests/support/run_node.h"
+#include "tests/support/volumes.h"
+
+extern "C" const voxloom::PluginTable* voxloom_plugin();
+
+using namespace voxloom;
+using namespace voxloom::testing;
+
+namespace {
+
+const Registry& slicer() {
+    static const Registry registry = [] {
+        Registry r;
+        voxloom_plugin()->add_to(r);
+        return r;
+    }();
+    return registry;
+}
+
+TransferPtr transfer(TransferFunction1D one) {
+    auto tf = std::make_shared<TransferFunction>();
+    tf->one = std::move(one);
+    return tf;
+}
+TransferPtr constant_medium(double tau) { return transfer({{{0, Emission(glm::dvec3(0.5) * tau, tau)}}}); }
+// Colour and opacity rise with the value.
+TransferPtr smooth(double most, double tau = 0.05) {
+    return transfer({{{0, Emission(0)}, {most, Emission(tau * 1.0, tau * 0.5, 0, tau)}}});
+}
+
+NodeRun draw(const Value& source, const SelectionPtr& selection, TransferPtr tf, const Camera& camera,
+             const std::string& more = "") {
+    NodeInputs inputs;
+    inputs["source"] = {source};
+    if (selection) inputs["selection"] = {selection};
+    inputs["transfer"] = {tf};
+    inputs["camera"] = {CameraPtr(std::make_shared<Camera>(camera))};
+    return run_node(slicer(), "slicer.render",
+                    "{size: [48, 40], background: [0, 0, 0, 0], early_termination: 1" + more + "}", inputs);
+}
+
+BricksPtr pyramid(const VolumePtr& volume, int brick, PyramidFilter filter = PyramidFilter::average) {
+    return make_dense_pyramid(volume, glm::ivec3(brick), filter);
+}
+
+// Everything at one level.
+std::shared_ptr<Selection> level_of(const BricksDesc& desc, int level) {
+    auto s = std::make_shared<Selection>();
+    s->of = std::make_shared<BricksDesc>(desc);
+    s->policy = "test";
+    const glm::ivec3 n = desc.levels[std::size_t(level)].bricks;
+    for (int z = 0; z < n.z; ++z)
+        for (int y = 0; y < n.y; ++y)
+            for (int x = 0; x < n.x; ++x) {
+                SelectedBrick b;
+                b.id = {level, {x, y, z}};
+                s->bricks.push_back(b);
+            }
+    return s;
+}
+
+// The coarsest brick, but for one of its octants, which is drawn finer; and so on downwards.
+std::shared_ptr<Selection> nested(const BricksDesc& desc, int octant) {
+    auto s = level_of(desc, int(desc.levels.size()) - 1);
+    for (;;) {
+        SelectedBrick& last = s->bricks.back();
+        if (last.id.level == 0) return s;
+        std::vector<BrickId> finer = desc.finer(last.id);
+        std::optional<BrickId> child;
+        std::uint8_t others = 0;
+        for (const BrickId& id : finer) {
+            if (desc.octant_of(id) == octant)
+                child = id;
+            else
+                others = std::uint8_t(others | 1 << desc.octant_of(id));
+        }
+        if (!child) return s;
+        last.octants = others;
+        SelectedBrick b;
+        b.id = *child;
+        s->bricks.push_back(b);
+    }
+}
+
+// One fine octant within coarse ones, blended as lod.balance does.
+std::shared_ptr<Selection> two_levels(const BricksDesc& desc, int octant, bool blended) {
+    const int top = int(desc.levels.size()) - 1;
+    auto s = level_of(desc, top - 1);
+    std::vector<SelectedBrick> bricks;
+    for (const SelectedBrick& b : s->bricks) {
+        if (desc.octant_of(b.id) != octant) {
+            bricks.push_back(b);
+            continue;
+        }
+        const glm::ivec3 begin = b.id.index * 2;
+        for (const BrickId& id : desc.finer(b.id)) {
+            SelectedBrick fine;
+            fine.id = id;
+            for (int c = 0; c < 8 && blended; ++c) {
+                const glm::ivec3 corner = id.index + glm::ivec3(c & 1, c >> 1 & 1, c >> 2);
+                // On a face of the octant, and not at the volume's end: a coarser brick is there.
+                for (int a = 0; a < 3; ++a) {
+                    const int upper = octant >> a & 1;
+                    if (corner[a] == begin[a] + (upper ? 0 : 2)) fine.corner_blend[std::size_t(c)] = 1;
+                }
+            }
+            bricks.push_back(fine);
+        }
+    }
+    s->bricks = bricks;
+    return s;
+}
+
+Camera looking(glm::dvec3 from, const VolumeDesc& desc, Camera::Projection projection, double distance = 1.5) {
+    const SamplingBox box = sampling_box(desc);
+    Camera c;
+    c.projection = projection;
+    c.target = glm::dvec3(desc.index_to_world * glm::dvec4(0.5 * (box.lo + box.hi), 1));
+    const double size = glm::length(glm::dmat3(desc.index_to_world) * (box.hi - box.lo));
+    c.eye = c.target + glm::normalize(from) * size * distance;
+    c.up = {0.1, 0.9, 0.2};
+    c.vertical_fov = 0.6;
+    c.height = size;
+    return c;
+}
+
+double largest_difference(const Image& a, const Image& b) {
+    double most = 0;
+    for (std::size_t i = 0; i < a.rgba32f().size(); ++i)
+        for (int c = 0; c < 4; ++c) most = std::max(most, double(std::abs(a.rgba32f()[i][c] - b.rgba32f()[i][c])));
+    return most;
+}
+double brightest(const Image& a) {
+    double most = 0;
+    for (glm::vec4 c : a.rgba32f()) most = std::max(most, double(c.a));
+    return most;
+}
+
+VolumePtr blob(Index3 dims, ScalarType type = ScalarType::u8, glm::dvec3 spacing = glm::dvec3(1)) {
+    return make_volume(dims, type, [dims](auto x, auto y, auto z) {
+        const glm::dvec3 p = glm::dvec3(x, y, z) / glm::dvec3(dims);
+        return 120 + 70 * std::sin(7 * p.x + 3 * p.y) + 50 * std::cos(9 * p.z - 4 * p.y);
+    }, spacing);
+}
+
+constexpr auto kPerspective = Camera::Projection::perspective;
+constexpr auto kOrthographic = Camera::Projection::orthographic;
+const glm::dvec3 kViews[] = {{0, 0, 1}, {1, 0, 0}, {0, -1, 0}, {1, 1, 0}, {1, 1, 1}, {-1, 2, 0.3}};
+
+}  // namespace
+
+TEST(BrickPath, AConstantMediumDoesNotDependOnThePartition) {
+    const VolumePtr volume = make_volume({33, 40, 27}, ScalarType::u8, [](auto, auto, auto) { return 100.0; });
+    const BricksPtr bricks = pyramid(volume, 8);
+    bool parallel = false;
+    for (glm::dvec3 from : kViews) {
+            parallel = !parallel;
+            const Camera camera = looking(from, volume->desc(), parallel ? kOrthographic : kPerspective, 1.2);
+            const ImagePtr whole = draw(volume, nullptr, constant_medium(0.05), camera).image();
+            EXPECT_GT(brightest(*whole), 0.5);
+            for (const SelectionPtr& s : {SelectionPtr(level_of(bricks->desc(), 0)), SelectionPtr(level_of(bricks->desc(), 1)),
+                                          SelectionPtr(nested(bricks->desc(), 0)), SelectionPtr(nested(bricks->desc(), 5))})
+                EXPECT_LT(largest_difference(*draw(bricks, s, constant_medium(0.05), camera).image(), *whole), 1e-5);
+        }
+}
+
+TEST(BrickPath, ARampIsTheSameFromEveryLevel) {
+    // 2^n + 1 voxels, so that the last one is a sample of every level.
+    const VolumePtr volume = make_volume({65, 33, 33}, ScalarType::u16, [](auto x, auto y, auto z) { return double(512 * x + 256 * y + 128 * z); });
+    const BricksPtr bricks = pyramid(volume, 8);
+    ASSERT_GE(bricks->desc().levels.size(), 4u);
+    const TransferPtr tf = transfer({{{0, Emission(0.05, 0, 0, 0.05)}, {45000, Emission(0, 0.05, 0.02, 0.05)}}});
+    for (glm::dvec3 from : kViews) {
+        const Camera camera = looking(from, volume->desc(), kPerspective);
+        // Extinction is constant, so the opacity is exact whatever the slices; colours are linear in the
+        // value, and slices of coarse levels are further apart.
+        const ImagePtr whole = draw(volume, nullptr, tf, camera, ", classification: post, slice_distance: 0.25").image();
+        for (int level = 0; level < 3; ++level)
+            EXPECT_LT(largest_difference(*draw(bricks, level_of(bricks->desc(), level), tf, camera,
+                                               ", classification: post, slice_distance: 0.25").image(), *whole), level ? 1e-3 : 1e-4) << level;
+    }
+}
+
+TEST(BrickPath, EveryBrickAtTheFinestLevelIsTheVolume) {
+    for (ScalarType type : {ScalarType::u8, ScalarType::i16, ScalarType::f32})
+        for (int brick : {8, 15, 16, 64}) {
+            const VolumePtr volume = blob({37, 50, 41}, type, {1, 1, 1.3});
+            const BricksPtr bricks = pyramid(volume, brick);
+            for (glm::dvec3 from : {kViews[std::size_t(brick) % 6], glm::dvec3(0.6, -1, 0.7)}) {
+                const Camera camera = looking(from, volume->desc(), kPerspective);
+                // Slabs are cut at the bricks' faces, so a nonlinear pre-integration differs by what is left of its error.
+                const ImagePtr a = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, ", slice_distance: 0.5").image();
+                const ImagePtr b = draw(volume, nullptr, smooth(240), camera, ", slice_distance: 0.5").image();
+                EXPECT_GT(brightest(*b), 0.5);
+                EXPECT_LT(largest_difference(*a, *b), 2e-4) << brick;
+            }
+        }
+}
+
+TEST(BrickPath, EveryModeDrawsWhatTheVolumeShows) {
+    const VolumePtr volume = blob({37, 50, 41});
+    const BricksPtr bricks = pyramid(volume, 16);
+    const Camera camera = looking({1, 0.6, 0.4}, volume->desc(), kPerspective);
+    for (const char* mode : {", compositing: mip", ", compositing: x-ray", ", compositing: isosurface, iso_value: 150",
+                             ", reconstruction: nearest", ", reconstruction: tricubic", ", classification: post",
+                             ", shading: true, gradient: central, gradient_source: on-the-fly",
+                             ", compositing: mip, shading: true, gradient: central, gradient_source: on-the-fly",
+                             ", compositing: isosurface, iso_value: 150, shading: true, gradient_source: on-the-fly"}) {
+        const ImagePtr a = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, mode).image();
+        const ImagePtr b = draw(volume, nullptr, smooth(240), camera, mode).image();
+        EXPECT_GT(brightest(*b), 0.04) << mode;
+        // A pixel at the rim of a surface, or on the border between two voxels, may fall on either side.
+        double sum = 0;
+        for (std::size_t i = 0; i < a->rgba32f().size(); ++i) sum += glm::dot(a->rgba32f()[i] - b->rgba32f()[i], a->rgba32f()[i] - b->rgba32f()[i]);
+        EXPECT_LT(std::sqrt(sum / double(4 * a->rgba32f().size())), 4e-3) << mode;
+    }
+}
+
+TEST(BrickPath, SkippingChangesNothing) {
+    const VolumePtr volume = make_volume({60, 50, 70}, ScalarType::u8, [](auto x, auto y, auto z) {
+        return glm::distance(glm::dvec3(x, y, z), glm::dvec3(30, 20, 40)) < 12 || (x == 7 && y == 9) ? 200.0 : double((x * y + z) % 20);
+    });
+    const BricksPtr bricks = pyramid(volume, 16);
+    const TransferPtr tf = transfer({{{50, Emission(0)}, {60, Emission(0.4)}}});
+    for (glm::dvec3 from : kViews)
+        for (const SelectionPtr& s : {SelectionPtr(level_of(bricks->desc(), 0)), SelectionPtr(two_levels(bricks->desc(), 0, true)), SelectionPtr(nested(bricks->desc(), 2))})
+            for (double distance : {0.2, 1.5}) {
+                const Camera camera = looking(from, volume->desc(), kPerspective, distance);
+                NodeRun with = draw(bricks, s, tf, camera);
+                if (s->bricks.size() > 10) {
+                    EXPECT_LT(with.counters["blocks drawn"], 0.8 * with.counters["blocks"]);
+                }
+                EXPECT_LT(largest_difference(*with.image(), *draw(bricks, s, tf, camera, ", skipping: false").image()), 2e-4) << s->bricks.size() << " " << distance;
+            }
+}
+
+TEST(BrickPath, BlendedFacesBetweenLevelsAgree) {
+    // Values that differ between levels everywhere, so dense that a parallel view shows the ones where it
+    // begins. It begins on a face between levels, and looks into either brick, along an axis on which
+    // they do not change.
+    const TransferPtr tf = transfer({{{0, Emission(0, 0, 0, 1e6)}, {65535, Emission(1e6, 5e5, 0, 1e6)}}});
+    for (int axis = 0; axis < 3; ++axis) {
+        const BricksPtr bricks = pyramid(make_volume({64, 64, 64}, ScalarType::u16, [axis](auto x, auto y, auto z) {
+            const std::int64_t p[] = {x, y, z};
+            return double((p[(axis + 1) % 3] * 7919 + p[(axis + 2) % 3] * 104729) % 65536);
+        }), 16);
+        auto looking_along = [&](double direction, bool blended) {
+            Camera camera;
+            camera.projection = kOrthographic;
+            camera.eye = {30.3, 31.1, 32.6};
+            camera.eye[axis] = 32 + 1e-5 * direction;
+            camera.target = camera.eye;
+            camera.target[axis] += direction;
+            camera.up = glm::dvec3(0);
+            camera.up[(axis + 1) % 3] = 1;
+            camera.height = 50;
+            return draw(bricks, two_levels(bricks->desc(), 0, blended), tf, camera, ", slice_distance: 0.01").image();
+        };
+        auto step = [&](bool blended) {
+            const ImagePtr fine = looking_along(-1, blended), coarse = looking_along(1, blended);
+            double most = 0;
+            for (int y = 0; y < 40; ++y)
+                for (int x = 0; x < 48; ++x)
+                    most = std::max(most, double(std::abs(fine->at(x, y).r - coarse->at(47 - x, y).r)));
+            return most;
+        };
+        EXPECT_GT(step(false), 0.05);
+        // The slab behind the face is a hundredth of a voxel deep, and no longer all blended at its end.
+        EXPECT_LT(step(true), 3e-4);
+    }
+}
+
+TEST(BrickPath, TheAtlasKeepsItsLimitAndItsBricks) {
+    const VolumePtr volume = blob({64, 64, 64});
+    const BricksPtr bricks = pyramid(volume, 8);
+    const Camera camera = looking({1, 1, 1}, volume->desc(), kPerspective);
+    NodeRun first = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera);
+    EXPECT_EQ(first.counters["bricks uploaded"], 512);
+    NodeRun again = draw(bricks, level_of(bricks->desc(), 0), smooth(240), looking({1, 0, 0}, volume->desc(), kPerspective));
+    EXPECT_EQ(again.counters["bricks uploaded"], 0);
+    EXPECT_EQ(again.counters["bricks resident"], 512);
+    NodeRun coarser = draw(bricks, level_of(bricks->desc(), 1), smooth(240), camera);
+    EXPECT_EQ(coarser.counters["bricks uploaded"], 64);
+
+    const BricksPtr large = pyramid(blob({128, 128, 128}), 32);
+    try {
+        draw(large, level_of(large->desc(), 0), smooth(240), camera, ", gpu_memory: 1");
+        FAIL();
+    } catch (const Error& e) {
+        EXPECT_THAT(e.what(), ::testing::HasSubstr("gpu_memory"));
+    }
+}
+
+TEST(BrickPath, BricksComeAndGoWithoutATrace) {
+    // A limit that holds one of two selections: each picture evicts the other's bricks.
+    const VolumePtr volume = blob({128, 128, 128});
+    const BricksPtr bricks = pyramid(volume, 16);
+    const Camera camera = looking({1, 1, 1}, volume->desc(), kPerspective);
+    auto half = [&](bool upper) {
+        auto s = level_of(bricks->desc(), 0);
+        std::erase_if(s->bricks, [&](const SelectedBrick& b) { return (b.id.index.x >= 4) != upper; });
+        return SelectionPtr(s);
+    };
+    const ImagePtr a = draw(bricks, half(false), smooth(240), camera, ", gpu_memory: 4").image();
+    const ImagePtr b = draw(bricks, half(true), smooth(240), camera, ", gpu_memory: 4").image();
+    EXPECT_GT(largest_difference(*a, *b), 0.1);
+    NodeRun back = draw(bricks, half(false), smooth(240), camera, ", gpu_memory: 4");
+    EXPECT_GT(back.counters["bricks evicted"], 0);
+    EXPECT_LT(largest_difference(*a, *back.image()), 1e-5);  // other slots round otherwise
+}
+
+TEST(BrickPath, VoxelsThatAreNotNumbersAreTransparent) {
+    const VolumePtr volume = make_volume({40, 40, 40}, ScalarType::f32, [](auto x, auto y, auto z) {
+        return x > 10 && x < 16 && y > 5 && z > 5 ? std::nan("") : 0.5 + 0.01 * double(x);
+    });
+    const BricksPtr bricks = pyramid(volume, 16);
+    for (glm::dvec3 from : kViews) {
+        const Camera camera = looking(from, volume->desc(), kPerspective);
+        EXPECT_LT(largest_difference(*draw(bricks, level_of(bricks->desc(), 0), smooth(1), camera, ", slice_distance: 0.5").image(),
+                                     *draw(volume, nullptr, smooth(1), camera, ", slice_distance: 0.5").image()), 5e-3);
+    }
+}
+
+TEST(BrickPath, ThinVolumesAndTheirEdges) {
+    for (Index3 dims : {Index3(1, 40, 40), Index3(33, 1, 1), Index3(17, 9, 2)}) {
+        const VolumePtr volume = blob(dims, ScalarType::u8, {0.5, 0.5, 5});
+        const BricksPtr bricks = pyramid(volume, 8);
+        const Camera camera = looking({1, 0.7, 0.4}, volume->desc(), kPerspective);
+        const ImagePtr a = draw(bricks, level_of(bricks->desc(), 0), smooth(240, 0.5), camera, ", slice_distance: 0.5").image();
+        const ImagePtr b = draw(volume, nullptr, smooth(240, 0.5), camera, ", slice_distance: 0.5").image();
+        EXPECT_GT(brightest(*b), 0.1);
+        EXPECT_LT(largest_difference(*a, *b), 2e-3);
+    }
+}
+
+TEST(BrickPath, RefusesASelectionOfOtherBricks) {
+    const BricksPtr bricks = pyramid(blob({40, 40, 40}), 8), others = pyramid(blob({40, 40, 48}), 8);
+    EXPECT_THROW(draw(bricks, level_of(others->desc(), 0), smooth(240), Camera()), Error);
+}

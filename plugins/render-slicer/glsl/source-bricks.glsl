@@ -1,0 +1,57 @@
+// Bricks in the slots of one texture. A page says which part of space a brick is drawn in, where its slot
+// is, and what it blends into at which corner; a ray is on one page at a time.
+uniform sampler3D brick_atlas;
+uniform vec3 brick_inverse_dims;
+uniform vec3 slot_lo, slot_hi;        // voxels that a slot holds, from the brick's first own one
+uniform vec3 brick_size;              // own voxels of a brick
+uniform sampler3D page_index;         // page of each cell, below 0: none
+uniform sampler2D page_table;         // 10 texels a page, 4096 pages a column
+uniform vec3 cell_size;               // index coordinates
+uniform ivec3 cell_last;
+
+vec3 page_lo, page_hi;                // what is drawn on the page, index coordinates
+vec3 page_first;                      // the brick's first voxel, index coordinates
+vec3 page_scale = vec3(1.0);          // voxels of the brick per index step
+float page_step = 1.0;                // planes between two slices
+float page_layer = 0.0;               // log2 of that
+vec3 slot_at;                         // texel of the brick's first own voxel
+float page_blends = 0.0;              // 1: mixes in its parent
+vec3 parent_at, parent_from, parent_scale;
+vec4 blend_below, blend_above;        // share of the parent at the corners, z low and high
+
+vec4 brick_fetch_voxel(ivec3 i) {
+    return texelFetch(brick_atlas, ivec3(slot_at + clamp(vec3(i), slot_lo, slot_hi)), 0);
+}
+vec4 brick_sample_linear(vec3 p) {
+    return texture(brick_atlas, (slot_at + clamp(p, slot_lo, slot_hi) + 0.5) * brick_inverse_dims);
+}
+
+// Turns to the page of a point; false where nothing is drawn.
+bool open_page(vec3 p) {
+    ivec3 cell = clamp(ivec3(floor(p / cell_size)), ivec3(0), cell_last);
+    float page = texelFetch(page_index, cell, 0).r;
+    bool there = page >= 0.0;
+    int i = int(max(page, 0.0));
+    ivec2 at = ivec2((i >> 12) * 10, i & 4095);
+    vec4 lo = texelFetch(page_table, at, 0), hi = texelFetch(page_table, at + ivec2(1, 0), 0);
+    vec4 first = texelFetch(page_table, at + ivec2(2, 0), 0);
+    page_step = lo.w;
+    page_layer = hi.w;
+    page_first = first.xyz;
+    slot_at = texelFetch(page_table, at + ivec2(3, 0), 0).xyz;
+    page_scale = texelFetch(page_table, at + ivec2(4, 0), 0).xyz;
+    // A cell at the volume's border reaches beyond it, as the ray ends there.
+    page_lo = mix(mix(vec3(cell) * cell_size, vec3(-1e6), equal(cell, ivec3(0))), lo.xyz, bvec3(there));
+    page_hi = mix(mix(vec3(cell + 1) * cell_size, vec3(1e9), equal(cell, cell_last)), hi.xyz, bvec3(there));
+#ifdef BLENDED
+    page_blends = there ? first.w : 0.0;
+    for (float turn = 0.0; turn < page_blends; turn += 1.0) {
+        parent_at = texelFetch(page_table, at + ivec2(5, 0), 0).xyz;
+        parent_from = texelFetch(page_table, at + ivec2(6, 0), 0).xyz;
+        parent_scale = texelFetch(page_table, at + ivec2(7, 0), 0).xyz;
+        blend_below = texelFetch(page_table, at + ivec2(8, 0), 0);
+        blend_above = texelFetch(page_table, at + ivec2(9, 0), 0);
+    }
+#endif
+    return there;
+}
