@@ -36,22 +36,6 @@ Camera::Projection projection_of(const Params& p) {
                                                  : Camera::Projection::orthographic;
 }
 
-UpAxis up_axis_of(const std::string& name) {
-    if (name == "x") return UpAxis::x;
-    if (name == "y") return UpAxis::y;
-    if (name == "-x") return UpAxis::minus_x;
-    if (name == "-y") return UpAxis::minus_y;
-    return name == "z" ? UpAxis::z : UpAxis::minus_z;
-}
-
-Subject subject_in(const Value& fit) {
-    if (is_empty(fit)) return unit_subject();
-    ValueDesc desc = describe(fit);
-    const VolumeDesc* volume = desc.volume();
-    if (!volume) fail("input 'fit' does not say where its voxels lie; wire a Volume to it");
-    return subject_of(*volume);
-}
-
 Camera orbit(const Params& p, const Value& fit) {
     Orbit o;
     o.up = up_axis_of(p.text("up_axis"));

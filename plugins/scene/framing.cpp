@@ -87,10 +87,31 @@ Subject unit_subject() {
     return subject;
 }
 
-Camera orbit_camera(const Subject& subject, const Orbit& orbit) {
-    const glm::dvec3 axis = direction_of(orbit.up);
+UpAxis up_axis_of(std::string_view name) {
+    if (name == "x") return UpAxis::x;
+    if (name == "y") return UpAxis::y;
+    if (name == "-x") return UpAxis::minus_x;
+    if (name == "-y") return UpAxis::minus_y;
+    return name == "z" ? UpAxis::z : UpAxis::minus_z;
+}
+
+Subject subject_in(const Value& fit) {
+    if (is_empty(fit)) return unit_subject();
+    ValueDesc desc = describe(fit);
+    const VolumeDesc* volume = desc.volume();
+    if (!volume) fail("input 'fit' does not say where its voxels lie; wire a Volume to it");
+    return subject_of(*volume);
+}
+
+glm::dmat3 frame_of(UpAxis up) {
+    const glm::dvec3 axis = direction_of(up);
     const glm::dvec3 front = axis.y == 0 ? glm::dvec3(0, -1, 0) : glm::dvec3(0, 0, 1);
-    const glm::dvec3 side = glm::cross(axis, front);
+    return {glm::cross(axis, front), -front, axis};
+}
+
+Camera orbit_camera(const Subject& subject, const Orbit& orbit) {
+    const glm::dmat3 frame = frame_of(orbit.up);
+    const glm::dvec3 side = frame[0], front = -frame[1], axis = frame[2];
     const glm::dvec3 around = front * std::cos(orbit.azimuth) + side * std::sin(orbit.azimuth);
     const double c = std::cos(orbit.elevation), s = std::sin(orbit.elevation);
     const glm::dvec3 to_eye = around * c + axis * s;

@@ -3,9 +3,10 @@
 
 #include <array>
 #include <glm/glm.hpp>
+#include <string_view>
 
 #include "core/data/camera.h"
-#include "core/data/volume.h"
+#include "core/data/value.h"
 
 namespace voxloom::scene {
 
@@ -21,8 +22,14 @@ struct Subject {
 Subject subject_of(const VolumeDesc& volume);
 // Without a volume: the cube that the unit sphere about the origin holds.
 Subject unit_subject();
+// The volume behind a value, whatever it is; the unit cube where there is none. Throws Error where the
+// value does not say where its voxels lie.
+Subject subject_in(const Value& fit);
 
 enum class UpAxis { x, y, z, minus_x, minus_y, minus_z };
+UpAxis up_axis_of(std::string_view name);  // "x", "-x", ...
+// From a frame with z upwards, seen from -y, to the world.
+glm::dmat3 frame_of(UpAxis up);
 
 // Angles in radians. With azimuth and elevation 0 the eye stands at -y of the subject (at +z where
 // up is along y). Azimuth turns it counterclockwise as seen from above, elevation lifts it, roll

@@ -6,6 +6,7 @@
 namespace voxloom::scene {
 
 NodeType camera_node();
+NodeType path_node();
 NodeType transfer_node();
 NodeType lights_node();
 

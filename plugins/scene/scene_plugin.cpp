@@ -5,6 +5,7 @@ namespace voxloom::scene {
 
 static void add_nodes(Registry& registry) {
     registry.add(camera_node());
+    registry.add(path_node());
     registry.add(transfer_node());
     registry.add(lights_node());
 }
