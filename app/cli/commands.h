@@ -23,10 +23,15 @@ struct RunArguments {
     int repeat = 1;
     std::vector<std::string> again;          // nodes that a repetition computes anew
     double cache_gib = 4;
+    std::string sweep;                       // NODE.PARAM=A..B or A..B..STEP; empty: one run
+    std::vector<std::string> every;          // NODE=N: of a sweep, runs in every n-th step alone
 };
 int run(const RunArguments& arguments, std::stop_token stop);
 // The same of a graph that is no file; arguments.graph is not looked at.
 int run(const Document& document, const RunArguments& arguments, std::stop_token stop);
+
+// A run for each value of a parameter: pictures with the step's number, and sweep.csv, a row a step.
+int sweep(const Document& document, const RunArguments& arguments, std::stop_token stop);
 
 struct CheckArguments {
     std::filesystem::path graph;

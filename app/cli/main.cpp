@@ -85,7 +85,13 @@ int main(int argc, char** argv) {
     command->add_option("--again", run.again, "NODE: what --repeat computes anew");
     command->add_option("--cache", run.cache_gib, "Memory for results, in GiB")
         ->check(CLI::Range(0.0, 1e6))->capture_default_str();
-    command->add_flag("--json", run.json, "The report on standard output");
+    CLI::Option* sweep = command->add_option("--sweep", run.sweep,
+                        "NODE.PARAM=A..B or A..B..STEP: one run a value; files are numbered, and sweep.csv "
+                        "has times, counters and measurements, a row a run");
+    command->add_option("--every", run.every,
+                        "NODE=N: of a sweep, this node and what depends on it run every n-th time alone")
+        ->needs(sweep);
+    command->add_flag("--json", run.json, "The report on standard output")->excludes(sweep);
     command->add_flag("--quiet", run.quiet, "No progress");
     command->footer("Images, tables and volumes are written to the --out folder as NODE.PORT.ext.\n"
                     "Example: voxloom run graphs/first-look.yaml --set view.size=[1024,1024] --out pictures");
