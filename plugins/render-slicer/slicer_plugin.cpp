@@ -138,7 +138,7 @@ NodeType render_node() {
                        "the picture is the same.").in_group("speed").for_experts(),
         param::integer("block_size", 8, "Cells on each side of a block for skipping.")
             .range(2, 128).slider(4, 32).in_group("speed").for_experts(),
-        param::integer("gpu_memory", 2048, "Textures kept between two pictures.")
+        param::integer("gpu_memory", 2048, "Textures kept between two pictures; three quarters of it may be bricks.")
             .range(0, 1 << 20).in_unit("MiB").in_group("speed").for_experts().changes(Affects::cost),
     };
     t.method = R"(**Method.** Planes normal to the view axis, anchored at the middle of the volume and common to all
@@ -152,11 +152,17 @@ A fragment marches all slabs of its ray, so that the accumulated colour never le
 that the transfer function leaves transparent are leapt over (a chessboard distance field tells how far),
 and a ray ends where it is saturated.
 
+Of bricks with a selection only what is selected is decoded and uploaded: into the slots of one texture, where
+bricks stay from picture to picture, least recently used out first. A ray goes from brick to brick, with the
+slices and the table of each one's level; slabs are cut at the faces between bricks, so what a ray meets does
+not depend on how the volume is cut. Where `lod.balance` says so a brick blends into its coarser neighbours.
+Gradients are computed on the fly there, and `gpu_memory` must hold the bricks of one picture.
+
 **When to use.** For looking at volumes, from 8-bit scans to floats, at any quality: `slice_distance` trades
 time for error, 2 for a quick look, 0.5 for a still.
 
 **When not.** Where the truth is asked for: `reference.raycast`. Volumes larger than the largest 3-D texture
-need a coarser level or a crop.
+need bricks and a selection, or a crop.
 
 **Reference.** Guthe, Wand, Gonser, Strasser: Interactive Rendering of Large Volume Data Sets, 2002; Engel,
 Kraus, Ertl: High-Quality Pre-Integrated Volume Rendering, 2001; Lum, Wilson, Ma: High-Quality Lighting and

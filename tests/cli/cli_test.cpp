@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 
@@ -150,6 +151,34 @@ TEST_F(Cli, setChangesOneRun) {
     EXPECT_EQ(r.status, 1);
     EXPECT_THAT(r.err, HasSubstr("did you mean 'dims'?"));
     EXPECT_EQ(run("run g.yaml --output q.volume").status, 1);
+}
+
+TEST_F(Cli, aSweepWritesFilesAndARowForEachStep) {
+    write("g.yaml", R"(voxloom: 1
+outputs: [level.volume, rarely.volume]
+nodes:
+  - { id: field, type: readers.phantom, set: { kind: ramp, dims: [32, 32, 32] } }
+  - { id: pyramid, type: bricks.pyramid, in: { volume: field.volume }, set: { brick: [8, 8, 8] } }
+  - { id: level, type: bricks.decode, in: { bricks: pyramid.bricks } }
+  - { id: rarely, type: bricks.decode, in: { bricks: pyramid.bricks } }
+)");
+    Ran r = run("run g.yaml --quiet --sweep level.level=0..2 --every rarely=2");
+    EXPECT_EQ(r.status, 0) << r.err;
+    for (const char* file : {"level.volume.0000.nrrd", "level.volume.0001.nrrd", "level.volume.0002.nrrd",
+                             "rarely.volume.0000.nrrd", "rarely.volume.0002.nrrd"})
+        EXPECT_TRUE(fs::exists(folder.path() / "out" / file)) << file;
+    EXPECT_FALSE(fs::exists(folder.path() / "out" / "rarely.volume.0001.nrrd"));
+    const std::string table = slurp(folder.path() / "out" / "sweep.csv");
+    EXPECT_EQ(std::ranges::count(table, '\n'), 4);
+    EXPECT_THAT(table, AllOf(HasSubstr("step,level.level,seconds"), HasSubstr("level cpu seconds"), HasSubstr("\n2,2,")));
+
+    for (const char* wrong : {"level.level=0", "level.level=a..b", "level.level=0..2..-1", "level.level=0..2..0"}) {
+        r = run(std::string("run g.yaml --quiet --sweep ") + wrong);
+        EXPECT_EQ(r.status, 1) << wrong;
+        EXPECT_THAT(r.err, HasSubstr("--sweep")) << wrong;
+    }
+    EXPECT_EQ(run("run g.yaml --quiet --sweep level.level=0..9").status, 1);  // there are fewer levels
+    EXPECT_EQ(run("run g.yaml --sweep level.level=0..1 --every nobody=2").status, 1);
 }
 
 TEST_F(Cli, jsonIsAllThatStandsOnStandardOutput) {
