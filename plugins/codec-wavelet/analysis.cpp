@@ -55,13 +55,28 @@ void to_low_band(const TreeDesc& tree, FamilyId family, FamilyCodec::Planes& pla
 
 }  // namespace
 
+FamilyCodec::Planes Encoding::originals(FamilyId family) const {
+    auto planes = original[std::size_t(family.level)].read(box_of(tree, family));
+    planes.resize(std::size_t(tree.bricks.volume.components));
+    return planes;
+}
+
+Mask Encoding::mask(FamilyId family) const {
+    const Box box = box_of(tree, family);
+    std::vector<std::int32_t> plane(box.voxels());
+    original[std::size_t(family.level)].read(box, tree.bricks.volume.components, plane.data());
+    return {plane.begin(), plane.end()};
+}
+
 void analyse(Encoding& e, bool counts, const Progress& progress) {
     const TreeDesc& tree = e.tree;
     const int top = tree.top(), components = tree.bricks.volume.components;
     const bool range_known = tree.bricks.volume.range.has_value();
     e.original.clear();
     e.original.resize(std::size_t(top) + 1);
-    for (int l = 1; l <= top; ++l) e.original[std::size_t(l)] = LevelStore(tree, l, l >= e.memory.first_level_in_memory);
+    const bool masked = tree.bricks.volume.has_mask;  // the levels' masks are one more plane
+    for (int l = 1; l <= top; ++l)
+        e.original[std::size_t(l)] = LevelStore(tree, l, components + masked, l >= e.memory.first_level_in_memory);
     e.sample = Sample(tree, e.memory.sample_in_memory);
     e.counts = CoefficientCounts(tree);
     ValueRange range = kNothing;
@@ -85,6 +100,10 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
             auto planes = l == 0 ? integers_of(tree, voxels, family) : e.originals(family);
             const auto bands = counts && counted.has(i) ? std::make_unique<CoefficientCounts::Bands>() : nullptr;
             to_low_band(tree, family, planes, bands.get());
+            if (masked) {
+                const Mask low = low_mask(l == 0 ? mask_of(voxels, box_of(tree, family)) : e.mask(family), shape_of(tree, family));
+                planes.emplace_back(low.begin(), low.end());
+            }
             e.original[std::size_t(l) + 1].write(tree.bricks.box_of({l + 1, family.index}), planes, parent_box(tree, family));
             if (!bands) return;
             const std::lock_guard lock(mutex);

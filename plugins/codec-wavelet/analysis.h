@@ -22,7 +22,8 @@ struct Encoding {
     ScalarType type() const { return tree.bricks.volume.type; }
     const ValueRange& range() const { return *tree.bricks.volume.range; }
     // Of a family above level 0.
-    FamilyCodec::Planes originals(FamilyId family) const { return original[std::size_t(family.level)].read(box_of(tree, family)); }
+    FamilyCodec::Planes originals(FamilyId family) const;
+    Mask mask(FamilyId family) const;
 };
 
 // Reads the volume once. Fills the levels by tree.map and, where the volume's range is not known, the range.

@@ -22,9 +22,11 @@ void widen(ValueRange& range, const ValueRange& by) {
 template <class T>
 struct Extremes {
     T lo = std::numeric_limits<T>::max(), hi = std::numeric_limits<T>::lowest();
-    void add(const T* values, std::size_t count) {
+    // `valid`, where there is one, is of voxels of so many components.
+    void add(const T* values, std::size_t count, const std::uint8_t* valid, std::size_t components) {
         T low = lo, high = hi;
         for (std::size_t i = 0; i < count; ++i) {
+            if (valid && !valid[i / components]) continue;
             if constexpr (std::is_floating_point_v<T>)
                 if (!std::isfinite(values[i])) continue;
             low = values[i] < low ? values[i] : low;
@@ -39,9 +41,9 @@ struct Extremes {
     }
 };
 
-// row(y, z) points at the brick's first value of a row. Calls use(part, lo, hi) for parts with a value.
-template <class T, class Row, class Use>
-void each_part(const Box& brick, int components, const Row& row, const Use& use) {
+// row(y, z) and valid(y, z) point at the brick's first voxel of a row. Calls use(part, lo, hi) for parts with a value.
+template <class T, class Row, class Valid, class Use>
+void each_part(const Box& brick, int components, const Row& row, const Valid& valid, const Use& use) {
     std::array<Extremes<T>, 27> parts;
     const auto c = static_cast<std::size_t>(components);
     const std::size_t count = std::size_t(brick.dims().x) * c;
@@ -49,9 +51,10 @@ void each_part(const Box& brick, int components, const Row& row, const Use& use)
         for (std::int64_t y = brick.lo.y; y < brick.hi.y; ++y) {
             const T* values = row(y, z);
             std::array<Extremes<T>, 3> here;
-            here[0].add(values, count);
-            here[1].add(values, c);
-            here[2].add(values + count - c, c);
+            const std::uint8_t* mask = valid(y, z);
+            here[0].add(values, count, mask, c);
+            here[1].add(values, c, mask, c);
+            here[2].add(values + count - c, c, mask ? mask + brick.dims().x - 1 : nullptr, c);
             const bool in_z[3] = {true, z == brick.lo.z, z + 1 == brick.hi.z};
             const bool in_y[3] = {true, y == brick.lo.y, y + 1 == brick.hi.y};
             for (std::size_t kz = 0; kz < 3; ++kz)
@@ -77,7 +80,8 @@ BrickParts parts_of(const Box& brick, const VoxelView& voxels, ScalarType type, 
         const auto row = [&](std::int64_t y, std::int64_t z) {
             return reinterpret_cast<const T*>(voxels.row(brick.lo.x, y, z));
         };
-        each_part<T>(brick, components, row, [&](std::size_t p, T lo, T hi) { parts.range[p] = {double(lo), double(hi)}; });
+        const auto valid = [&](std::int64_t y, std::int64_t z) { return voxels.mask_row(brick.lo.x, y, z); };
+        each_part<T>(brick, components, row, valid, [&](std::size_t p, T lo, T hi) { parts.range[p] = {double(lo), double(hi)}; });
     });
     return parts;
 }
@@ -87,7 +91,8 @@ void add_parts(const TreeDesc& tree, const Box& brick, const std::vector<std::in
     const auto row = [&](std::int64_t y, std::int64_t z) {
         return reinterpret_cast<const std::int32_t*>(view.row(brick.lo.x, y, z));
     };
-    each_part<std::int32_t>(brick, 1, row, [&](std::size_t p, std::int32_t lo, std::int32_t hi) {
+    const auto valid = [](std::int64_t, std::int64_t) -> const std::uint8_t* { return nullptr; };
+    each_part<std::int32_t>(brick, 1, row, valid, [&](std::size_t p, std::int32_t lo, std::int32_t hi) {
         widen(parts.range[p], {delivered(tree, lo), delivered(tree, hi)});
     });
 }

@@ -126,9 +126,10 @@ class Measured final : public CoarseErrors {
             for (std::int64_t z = box.lo.z; z < box.hi.z; ++z)
                 for (std::int64_t y = box.lo.y; y < box.hi.y; ++y, at += n) {
                     const auto* row = reinterpret_cast<const decltype(t)*>(original.row(box.lo.x, y, z)) + c;
+                    const std::uint8_t* valid = original.mask_row(box.lo.x, y, z);
                     for (std::size_t i = 0; i < n; ++i) {
                         const Real v = Real(row[i * components()]);
-                        const bool finite = std::isfinite(v);
+                        const bool finite = std::isfinite(v) && (!valid || valid[i]);
                         truth[at + i] = finite ? v : Real(0);
                         counts[at + i] = finite ? Real(1) : Real(0);
                     }

@@ -18,7 +18,7 @@ class CoarseErrors {
   public:
     virtual ~CoarseErrors() = default;
     // Of every level from 1 on over one family of level 0, brick by brick: sums[brick * levels + level - 1],
-    // bricks x fastest. Voxels that are not finite do not count. [any thread]
+    // bricks x fastest. Voxels that are not finite or not valid do not count. [any thread]
     virtual void measure(const VoxelView& original, FamilyId family, std::vector<ErrorSum>& sums) const = 0;
 };
 

@@ -9,8 +9,9 @@
 
 namespace voxloom::wavelet {
 
-double error_bound(const EncodeOptions& options) {
-    return options.target == Target::max_error ? options.amount : std::numeric_limits<double>::infinity();
+double error_bound(const EncodeOptions& options, const TreeDesc& tree) {
+    if (options.target == Target::max_error) return options.amount;
+    return options.target == Target::lossless && !tree.distances ? 0 : std::numeric_limits<double>::infinity();
 }
 
 std::int64_t families_to_learn_from(CoderKind kind) {
@@ -58,7 +59,7 @@ class Emission {
         const NoCoder none;
         const FamilyCodec codec(tree_, none);
         for (int l = tree_.top(); l > 0; --l) {
-            decoded_[std::size_t(l)] = LevelStore(tree_, l, l >= e_.memory.first_level_in_memory);
+            decoded_[std::size_t(l)] = LevelStore(tree_, l, tree_.bricks.volume.components, l >= e_.memory.first_level_in_memory);
             for (std::int64_t at = 0; at < family_count(tree_, l);) {
                 const Tile tile = tile_from(tree_, l, at, e_.memory.coarse_tile_voxels);
                 each_family(tree_, tile, e_.stop, progress_.part(l == 1 ? 0.01 : 0, l == 1 ? 0.04 : 0.01), [&](std::int64_t i) {
@@ -111,7 +112,7 @@ class Emission {
                 each_family(tree_, tile, e_.stop, progress, [&](std::int64_t i) {
                     const FamilyId family = family_at(tree_, 0, i);
                     encoded[std::size_t(i - tile.first)] =
-                        encode_fine(codec, tree_, family, voxels.view(), parent_of(family), error_bound(e_.options), coarse.get());
+                        encode_fine(codec, tree_, family, voxels.view(), parent_of(family), error_bound(e_.options, tree_), coarse.get());
                 });
             } else {
                 each_family(tree_, tile, e_.stop, progress, [&](std::int64_t i) {
@@ -131,6 +132,7 @@ class Emission {
         const Box box = box_of(tree_, family);
         EncodedFamily result;
         auto planes = e_.originals(family);
+        if (tree_.bricks.volume.has_mask) result.add_mask(e_.mask(family), box.dims());
         codec.encode(family, parent_of(family), planes, result.bytes);
         result.drop_if_empty();
         result.check = check_of(result.bytes);

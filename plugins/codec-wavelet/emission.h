@@ -16,7 +16,7 @@ class NoCoder final : public Coder {
 };
 
 // Voxels that err by more are stored as they are.
-double error_bound(const EncodeOptions& options);
+double error_bound(const EncodeOptions& options, const TreeDesc& tree);
 // Families of the sample that a coder learns from.
 std::int64_t families_to_learn_from(CoderKind kind);
 

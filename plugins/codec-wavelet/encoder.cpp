@@ -9,6 +9,7 @@
 #include "core/base/text.h"
 #include "plugins/codec-wavelet/emission.h"
 #include "plugins/codec-wavelet/step_search.h"
+#include "plugins/codec-wavelet/value_survey.h"
 
 namespace voxloom::wavelet {
 
@@ -29,11 +30,8 @@ class Encoder {
             return emit(e_, report, progress_);
         }
         e_.memory = plan_memory(e_.volume, tree, options_.memory);
-        // Small integers need no range to be mapped, and theirs is found on the way.
-        if (is_float(e_.type()) || bytes_of(e_.type()) > 2) tree.bricks.volume.range = value_range(e_.volume, e_.stop);
-        tree.map = map_of(e_.type(), tree.bricks.volume.range.value_or(ValueRange{}), lossy() ? fraction_bits() : 0);
-        tree.distances = options_.target == Target::lossless && !is_exact(e_.type(), tree.bricks.volume.range.value_or(ValueRange{}));
-        analyse(e_, lossy(), progress_.part(0, 0.2));
+        choose_map();
+        analyse(e_, lossy(), progress_.part(0.1, 0.25));
         switch (options_.target) {
             case Target::lossless: break;
             case Target::threshold: tree.quantiser.threshold = options_.amount / tree.map.step; break;
@@ -42,12 +40,28 @@ class Encoder {
             case Target::bpv:
             case Target::ratio: return for_budget(report);
         }
-        return emit(e_, report, progress_.part(0.2, 1));
+        return emit(e_, report, progress_.part(0.25, 1));
     }
 
   private:
     bool lossy() const { return options_.target != Target::lossless && options_.target != Target::threshold; }
     int fraction_bits() const { return bytes_of(e_.type()) == 1 ? 4 : 3; }  // keep lifting's rounding out of the result
+
+    void choose_map() {
+        TreeDesc& tree = e_.tree;
+        auto& range = tree.bricks.volume.range;
+        const bool small = !is_float(e_.type()) && bytes_of(e_.type()) <= 2, lossless = options_.target == Target::lossless;
+        // Small integers need no range to be mapped, and theirs is found on the way.
+        const bool look = !range && (!small || tree.bricks.volume.has_mask);
+        ValueSurvey values;
+        if (look || (is_float(e_.type()) && lossless)) {
+            values = survey(e_.volume, tree, e_.memory.tile_voxels, e_.stop, progress_.part(0, 0.1));
+            range = values.range;
+        }
+        tree.map = map_of(e_.type(), range.value_or(ValueRange{}), lossy() ? fraction_bits() : 0);
+        if (lossless && values.grid > 0) tree.map = {values.grid, 0};
+        tree.distances = lossless && !is_exact(e_.type(), range.value_or(ValueRange{})) && values.grid == 0;
+    }
 
     // Where losing nothing is no dearer than the quantiser at hand, or than `budget` bytes.
     bool better_lossless(StepSearch& search, double budget) {
@@ -165,8 +179,6 @@ std::string provenance_of(const EncodeOptions& options) {
 }  // namespace
 
 TreeDesc plan(const VolumeDesc& volume, const EncodeOptions& options) {
-    if (volume.has_mask)
-        fail("a volume with a validity mask cannot be encoded; write NaN into what is not valid, as floats");
     TreeDesc tree;
     tree.bricks.volume = volume;
     tree.bricks.brick = glm::ivec3(options.brick);

@@ -87,7 +87,7 @@ void expect_agreement(const WaveletBricks& bricks) {
     std::size_t compared = 0;
     for (int l = tree.top(); l >= 0; --l) {
         LevelStore& here = levels[std::size_t(l)];
-        here = LevelStore(tree, l, true);
+        here = LevelStore(tree, l, tree.bricks.volume.components, true);
         std::size_t i = 0;
         for_each_family(tree, l, [&](FamilyId family) {
             const FamilyPlace place = bricks.index().families[std::size_t(l)][i++];
@@ -178,7 +178,7 @@ double largest_mismatch(Faces faces, glm::dvec3 spacing) {
     std::mt19937 random(8);
     FamilyCodec::Planes noise(1, std::vector<std::int32_t>(Box::of(coarse.dims).voxels()));
     for (auto& v : noise[0]) v = std::int32_t(random() % 20001) - 10000;
-    LevelStore above(tree, 1, true);
+    LevelStore above(tree, 1, 1, true);
     above.write(Box::of(coarse.dims), noise, Box::of(coarse.dims));
     double largest = 0;
     for_each_family(tree, 0, [&](FamilyId family) {

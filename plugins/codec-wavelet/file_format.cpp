@@ -160,6 +160,7 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
     w.number(std::uint8_t(tree.split));
     w.number(std::uint8_t(tree.distances));
     w.number(std::uint8_t(tree.faces));
+    w.number(std::uint8_t(v.has_mask));
     w.number(tree.map.step);
     w.number(tree.map.offset);
     w.number(tree.quantiser.step);
@@ -219,6 +220,7 @@ TreeDesc read_tree(ByteReader& r, std::uint32_t version) {
     tree.split = r.number<std::uint8_t>() != 0;
     tree.distances = r.number<std::uint8_t>() != 0;
     const auto faces = version >= 2 ? r.number<std::uint8_t>() : std::uint8_t(0);
+    v.has_mask = version >= 3 && r.number<std::uint8_t>() != 0;
     tree.map.step = r.number<double>();
     tree.map.offset = r.number<double>();
     tree.quantiser.step = r.number<double>();

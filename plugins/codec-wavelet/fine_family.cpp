@@ -11,8 +11,14 @@
 
 namespace voxloom::wavelet {
 
+void EncodedFamily::add_mask(const Mask& mask, Index3 dims) {
+    Bytes part;
+    encode_mask(mask, dims, part);
+    ByteWriter(bytes).block(part);
+}
+
 void EncodedFamily::drop_if_empty() {
-    if (bytes.size() <= 5 && std::all_of(bytes.begin(), bytes.end(), [](std::byte b) { return b == std::byte(0); })) bytes.clear();
+    if (bytes.size() <= 6 && std::all_of(bytes.begin(), bytes.end(), [](std::byte b) { return b == std::byte(0); })) bytes.clear();
 }
 
 bool keeps_integers(const TreeDesc& tree) { return tree.quantiser.step <= 0 && tree.quantiser.threshold <= 0; }
@@ -24,8 +30,9 @@ bool keeps_voxels(const TreeDesc& tree) {
 
 namespace {
 
-// Distances and patches, after which `near` is what the decoder gives. Both arrays are of one family.
-std::uint64_t finish_exactly(const TreeDesc& tree, const Buffer& exact, Buffer& near, double bound, Bytes& out) {
+// Distances and patches, after which `near` is what the decoder gives. All arrays are of one family. A bound of 0 means
+// every bit. What is not valid (`mask`, if any) may become anything.
+std::uint64_t finish_exactly(const TreeDesc& tree, const Buffer& exact, Buffer& near, const Mask& mask, double bound, Bytes& out) {
     const ScalarType type = tree.bricks.volume.type;
     const std::size_t each = bytes_of(type), count = exact.size() / each;
     std::vector<std::uint8_t> patched(count);
@@ -34,15 +41,19 @@ std::uint64_t finish_exactly(const TreeDesc& tree, const Buffer& exact, Buffer& 
         const auto truth = exact.as<T>(), given = static_cast<const Buffer&>(near).as<T>();
         for (std::size_t i = 0; i < count; ++i) {
             patched[i] = std::abs(double(truth[i]) - double(given[i])) > bound;
-            if constexpr (std::is_floating_point_v<T>) patched[i] = patched[i] || !std::isfinite(truth[i]);
+            if constexpr (std::is_floating_point_v<T>)
+                patched[i] = patched[i] || !std::isfinite(truth[i]) || (bound == 0 && std::signbit(truth[i]) != std::signbit(given[i]));
         }
     });
+    const auto components = std::size_t(tree.bricks.volume.components);
+    const auto valid = [&](std::size_t i) { return mask.empty() || mask[i / components]; };
+    for (std::size_t i = 0; i < count; ++i) patched[i] = patched[i] && valid(i);
     ByteWriter writer(out);
     Bytes part;
     if (tree.distances) {
         Buffer wanted(exact.size(), "voxels to encode");
         for (std::size_t i = 0; i < count; ++i)
-            std::copy_n((patched[i] ? near : exact).data() + i * each, each, wanted.data() + i * each);
+            std::copy_n((patched[i] || !valid(i) ? near : exact).data() + i * each, each, wanted.data() + i * each);
         encode_distances(type, wanted.data(), near.data(), count, part);
         std::copy_n(wanted.data(), wanted.size(), near.data());
     }
@@ -60,8 +71,9 @@ std::uint64_t finish_exactly(const TreeDesc& tree, const Buffer& exact, Buffer& 
 }
 
 template <class T>
-void add_errors(const T* truth, const T* given, std::size_t count, MeasuredBrick& brick) {
-    if constexpr (std::is_integral_v<T> && sizeof(T) <= 2) {
+void add_errors(const T* truth, const T* given, const std::uint8_t* valid, std::size_t count, std::size_t components,
+                MeasuredBrick& brick) {
+    if (std::is_integral_v<T> && sizeof(T) <= 2 && !valid) {
         std::uint64_t squares = 0;
         std::int32_t largest = 0;
         for (std::size_t i = 0; i < count; ++i) {
@@ -74,6 +86,7 @@ void add_errors(const T* truth, const T* given, std::size_t count, MeasuredBrick
         brick.finite += count;
     } else {
         for (std::size_t i = 0; i < count; ++i) {
+            if (valid && !valid[i / components]) continue;
             if constexpr (std::is_floating_point_v<T>)
                 if (!std::isfinite(truth[i])) continue;
             const double e = std::abs(double(truth[i]) - double(given[i]));
@@ -95,6 +108,7 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
     EncodedFamily result;
     FamilyCodec::Planes planes = integers_of(tree, original, family);
     Buffer near;
+    if (volume.has_mask) result.add_mask(mask_of(original, box_of(tree, family)), box_of(tree, family).dims());
     const auto decode = [&](FamilyCodec::Planes decoded) {
         FamilyCodec::crop(decoded, box_of(tree, family), box);
         near = Buffer(count * volume.voxel_bytes(), "voxels decoded");
@@ -112,19 +126,20 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
     if (tree.distances || (may_patch && !exact)) {
         Buffer truth(count * volume.voxel_bytes(), "voxels to encode");
         copy_box(box, original.data, original.box, truth.data(), box, volume.voxel_bytes());
-        result.patches = finish_exactly(tree, truth, near, bound, result.bytes);
+        result.patches = finish_exactly(tree, truth, near, original.mask ? mask_of(original, box) : Mask(), bound, result.bytes);
     } else {
         ByteWriter(result.bytes).block({});
     }
     result.drop_if_empty();
     result.check = check_of(result.bytes);
 
-    const VoxelView given = exact ? original : VoxelView{box, near.data(), volume.voxel_bytes()};
+    const Mask mask = exact || !original.mask ? Mask() : mask_of(original, box);
+    const VoxelView given = exact ? original : VoxelView{box, near.data(), volume.voxel_bytes(), mask.empty() ? nullptr : mask.data()};
     for (const BrickId& id : bricks_of(tree, family)) {
         const Box part = tree.bricks.box_of(id);
         MeasuredBrick brick{id, parts_of(part, given, volume.type, volume.components)};
         const std::size_t row = std::size_t(part.dims().x) * std::size_t(volume.components);
-        if (exact) {
+        if (exact && !original.mask) {
             brick.finite = part.voxels() * std::uint64_t(volume.components);
         } else {
             with_type(volume.type, [&](auto t) {
@@ -132,7 +147,8 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
                 for (std::int64_t z = part.lo.z; z < part.hi.z; ++z)
                     for (std::int64_t y = part.lo.y; y < part.hi.y; ++y)
                         add_errors(reinterpret_cast<const T*>(original.row(part.lo.x, y, z)),
-                                   reinterpret_cast<const T*>(given.row(part.lo.x, y, z)), row, brick);
+                                   reinterpret_cast<const T*>(given.row(part.lo.x, y, z)), original.mask_row(part.lo.x, y, z), row,
+                                   std::size_t(volume.components), brick);
             });
         }
         result.bricks.push_back(std::move(brick));

@@ -9,7 +9,7 @@ namespace voxloom::wavelet {
 struct MeasuredBrick {
     BrickId id;
     BrickParts parts;
-    double squares = 0, largest = 0;  // of the errors of finite values
+    double squares = 0, largest = 0;  // of the errors of finite, valid values
     std::uint64_t finite = 0;
 };
 
@@ -19,6 +19,8 @@ struct EncodedFamily {
     std::uint64_t patches = 0;
     std::vector<MeasuredBrick> bricks;
     std::vector<ErrorSum> coarse;  // as CoarseErrors::measure() gives them
+    // Goes before everything else.
+    void add_mask(const Mask& mask, Index3 dims);
     // Lengths of empty streams say nothing that the absence of all bytes does not.
     void drop_if_empty();
 };

@@ -38,7 +38,7 @@ Costs costs_of(const Volume& volume, const TreeDesc& tree) {
     // 24 MiB are what program and libraries take.
     costs.fixed = 24 * kMiB + std::uint64_t(thread * tbb::this_task_arena::max_concurrency() +
                                             bricks * (sizeof(BrickInfo) + 16) + families * (sizeof(FamilyPlace) + 8));
-    costs.tile_voxel = (volume.data() ? 0 : voxel) + 2.5 * voxel + 4 * components;
+    costs.tile_voxel = (volume.desc().has_mask ? voxel + 1 : volume.data() ? 0 : voxel) + 2.5 * voxel + 4 * components;
     costs.coarse_voxel = 8 * components;
     return costs;
 }
@@ -74,7 +74,8 @@ MemoryPlan plan_memory(const Volume& volume, const TreeDesc& tree, std::uint64_t
     double stores = left / 3;
     plan.first_level_in_memory = tree.top() + 1;
     for (int l = tree.top(); l > 0; --l) {
-        stores -= 2 * double(LevelStore::bytes(tree, l));  // as they are, and as they will be decoded
+        // As they are, and as they will be decoded; a mask takes a plane of its own.
+        stores -= double(LevelStore::bytes(tree, l, 2 * volume.desc().components + volume.desc().has_mask));
         if (stores < 0) break;
         plan.first_level_in_memory = l;
     }

@@ -7,7 +7,7 @@ namespace voxloom::wavelet {
 namespace {
 
 std::uint64_t family_bytes(const TreeDesc& tree) {
-    return box_of(tree, family_at(tree, 0, 0)).voxels() * tree.bricks.volume.voxel_bytes();
+    return box_of(tree, family_at(tree, 0, 0)).voxels() * (tree.bricks.volume.voxel_bytes() + tree.bricks.volume.has_mask);
 }
 
 }  // namespace
@@ -36,15 +36,20 @@ void Sample::keep(const TreeDesc& tree, std::int64_t family, const VoxelView& vo
     const Box box = box_of(tree, family_at(tree, 0, family));
     Buffer own(box.voxels() * voxels.voxel_bytes, "sample of the voxels");
     copy_box(box, voxels.data, voxels.box, own.data(), box, voxels.voxel_bytes);
-    store_.write(std::uint64_t(selection_.slot(family)) * stride_, own.bytes());
+    const std::uint64_t at = std::uint64_t(selection_.slot(family)) * stride_;
+    store_.write(at, own.bytes());
+    if (!voxels.mask) return;
+    const Mask mask = mask_of(voxels, box);
+    store_.write(at + own.size(), std::as_bytes(std::span(mask)));
 }
 
 VoxelView Sample::get(const TreeDesc& tree, std::int64_t i, Buffer& buffer) const {
     const Box box = box_of(tree, family_at(tree, 0, selection_.family(i)));
     const std::size_t each = tree.bricks.volume.voxel_bytes();
-    buffer = Buffer(box.voxels() * each, "sample of the voxels");
+    const bool masked = tree.bricks.volume.has_mask;
+    buffer = Buffer(box.voxels() * (each + masked), "sample of the voxels");
     store_.read(std::uint64_t(i) * stride_, buffer.bytes());
-    return {box, buffer.data(), each};
+    return {box, buffer.data(), each, masked ? buffer.as<std::uint8_t>().data() + box.voxels() * each : nullptr};
 }
 
 }  // namespace voxloom::wavelet

@@ -130,7 +130,7 @@ Estimate StepSearch::estimate(bool with_bytes) {
             codec.encode(family, low, planes, out, FamilyCodec::After::spoiled);
             own = out.size();
         } else {
-            const EncodedFamily encoded = encode_fine(codec, tree, family, voxels, low, error_bound(e_.options), nullptr);
+            const EncodedFamily encoded = encode_fine(codec, tree, family, voxels, low, error_bound(e_.options, tree), nullptr);
             for (const MeasuredBrick& brick : encoded.bricks) {
                 squares += brick.squares;
                 finite += brick.finite;
@@ -168,26 +168,23 @@ double StepSearch::lossless_bytes() {
     return bytes;
 }
 
-// False position on logarithms. measure() grows with the step, nearly `slope` times as fast.
+// Newton's method on logarithms with the slope of the last two trials, kept within what is known to be too fine and
+// too coarse. measure() grows with the step, nearly `slope` times as fast.
 void StepSearch::find(double start, double goal, double slope, const std::function<double()>& measure) {
-    double step = std::max(1.0, start), finer = 0, coarser = 0, below = 0, above = 0;
-    for (int round = 0; round < 12; ++round) {
-        set_step(step);
+    constexpr double close = 0.005;  // 0.02 dB, half a per cent of the bytes
+    double x = std::log(std::max(1.0, start)), last_x = 0, last_off = 0;
+    double finest = 0, coarsest = std::log(1e12);
+    for (int round = 0; round < 10; ++round) {
+        set_step(std::exp(x));
         const double off = measure() - goal;
-        if (std::abs(off) < 0.002 * slope || (off > 0 && step <= 1) || step > 1e12) return;
-        if (off < 0) {
-            finer = step;
-            below = off;
-        } else {
-            coarser = step;
-            above = off;
-        }
-        if (finer > 0 && coarser > 0) {
-            if (coarser / finer < 1.0005) return;
-            step = finer * std::pow(coarser / finer, std::clamp(below / (below - above), 0.05, 0.95));
-        } else {
-            step = std::max(1.0, step * std::exp(std::clamp(-off / slope, -2.0, 2.0)));
-        }
+        if (std::abs(off) < close || coarsest - finest < 0.0005) return;
+        if (off > 0 && x <= 0) return;  // nothing is finer
+        (off < 0 ? finest : coarsest) = x;
+        if (round > 0 && x != last_x) slope = std::clamp((off - last_off) / (x - last_x), slope / 3, slope * 3);
+        last_x = x;
+        last_off = off;
+        x = std::clamp(x - off / slope, finest + 0.02 * (coarsest - finest), coarsest - 0.02 * (coarsest - finest));
+        if (finest == 0 && off > 0) x = std::max(0.0, last_x - off / slope);
     }
 }
 

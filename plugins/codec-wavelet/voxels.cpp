@@ -10,18 +10,29 @@ namespace voxloom::wavelet {
 
 VoxelTile::VoxelTile(const Volume& volume, const Box& box, const std::stop_token& stop) {
     const std::size_t each = volume.desc().voxel_bytes();
-    if (volume.data()) {
+    const bool masked = volume.desc().has_mask;
+    if (volume.data() && !masked) {
         view_ = {Box::of(volume.desc().dims), volume.data(), each};
         return;
     }
     voxels_ = Buffer(box.voxels() * each, "voxels to encode");
-    view_ = {box, voxels_.data(), each};
+    if (masked) mask_ = Buffer(box.voxels(), "mask of the voxels");
+    view_ = {box, voxels_.data(), each, masked ? mask_.as<std::uint8_t>().data() : nullptr};
     const Index3 n = box.dims();
-    const std::uint64_t slice = std::uint64_t(n.x) * std::uint64_t(n.y) * each;
+    const std::uint64_t slice = std::uint64_t(n.x) * std::uint64_t(n.y);
     parallel_for(box.lo.z, box.hi.z, std::max<std::int64_t>(1, n.z / 8), [&](std::int64_t lo, std::int64_t hi) {
         const Box part{{box.lo.x, box.lo.y, lo}, {box.hi.x, box.hi.y, hi}};
-        volume.read(part, voxels_.bytes().subspan(slice * std::uint64_t(lo - box.lo.z), part.voxels() * each), stop);
+        const std::uint64_t first = slice * std::uint64_t(lo - box.lo.z);
+        volume.read(part, voxels_.bytes().subspan(first * each, part.voxels() * each), stop);
+        if (masked) volume.read_mask(part, mask_.as<std::uint8_t>().subspan(first, part.voxels()));
     }, stop);
+}
+
+Mask mask_of(const VoxelView& voxels, const Box& box) {
+    Mask mask(box.voxels(), 1);
+    if (voxels.mask)
+        copy_box(box, reinterpret_cast<const std::byte*>(voxels.mask), voxels.box, reinterpret_cast<std::byte*>(mask.data()), box, 1);
+    return mask;
 }
 
 namespace {
@@ -110,7 +121,7 @@ FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, F
     const auto components = std::size_t(volume.components), row = std::size_t(box.dims().x);
     FamilyCodec::Planes planes(components, std::vector<std::int32_t>(box.voxels()));
     const int shift = tree.map.shift();
-    if (!is_float(volume.type) && bytes_of(volume.type) <= 2 && shift >= 0) {
+    if (!is_float(volume.type) && bytes_of(volume.type) <= 2 && shift >= 0 && !voxels.mask) {
         with_type(volume.type, [&](auto t) {
             each_row(box, [&](std::int64_t y, std::int64_t z, std::size_t at) {
                 const auto* from = reinterpret_cast<const decltype(t)*>(voxels.row(box.lo.x, y, z));
@@ -123,11 +134,12 @@ FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, F
     std::vector<std::vector<std::uint8_t>> known(components, std::vector<std::uint8_t>(box.voxels()));
     each_row(box, [&](std::int64_t y, std::int64_t z, std::size_t at) {
         to_double(volume.type, voxels.row(box.lo.x, y, z), values.size(), values.data());
+        const std::uint8_t* valid = voxels.mask_row(box.lo.x, y, z);
         for (std::size_t c = 0; c < components; ++c)
             for (std::size_t i = 0; i < row; ++i) {
                 const double v = values[i * components + c];
-                known[c][at + i] = std::isfinite(v);
-                planes[c][at + i] = std::isfinite(v) ? tree.map.tree(v) : 0;
+                known[c][at + i] = std::isfinite(v) && (!valid || valid[i]);
+                planes[c][at + i] = known[c][at + i] ? tree.map.tree(v) : 0;
             }
     });
     const double middle = volume.range ? volume.range->min / 2 + volume.range->max / 2 : 0;

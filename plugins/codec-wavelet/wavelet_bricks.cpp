@@ -7,6 +7,7 @@
 #include "core/data/convert.h"
 #include "plugins/codec-wavelet/byte_io.h"
 #include "plugins/codec-wavelet/exact_layer.h"
+#include "plugins/codec-wavelet/mask_layer.h"
 #include "plugins/codec-wavelet/passes.h"
 
 namespace voxloom::wavelet {
@@ -85,6 +86,48 @@ std::uint64_t WaveletBricks::family_bytes(BrickId id) const {
     return voxels * (desc().tree_voxel_bytes() + (state ? sizeof(std::int32_t) * std::uint64_t(desc().volume.components) : 0));
 }
 
+namespace {
+
+const Bytes kNothing(64);
+bool is_nothing(std::span<const std::byte> bytes) { return bytes.data() == kNothing.data(); }
+
+[[noreturn]] void fail_damaged(BrickId id, const Error& e) {
+    fail("the compressed data of brick {} {} {} of level {} is damaged ({}); get the file again", id.index.x, id.index.y,
+         id.index.z, id.level, e.what());
+}
+
+}  // namespace
+
+std::span<const std::byte> WaveletBricks::family_stream(BrickId id) const {
+    const glm::ivec3 grid = families_of(index_.tree, id.level);
+    const FamilyPlace& place = index_.families[std::size_t(id.level)][place_in(grid, family_of(index_.tree, id).index)];
+    const auto bytes = payload_.bytes.subspan(std::size_t(place.offset), std::size_t(place.size));
+    if (check_of(bytes) != place.check) fail("its checksum is wrong");
+    return bytes.empty() ? std::span<const std::byte>(kNothing) : bytes;
+}
+
+void WaveletBricks::read_mask(int level, const Box& box, std::span<std::uint8_t> out) const {
+    if (box.empty()) return;
+    const TreeDesc& tree = index_.tree;
+    const Index3 brick(desc().brick);
+    const FamilyId first = family_of(tree, {level, glm::ivec3(box.lo / brick)});
+    const FamilyId last = family_of(tree, {level, glm::ivec3((box.hi - Index3(1)) / brick)});
+    for (int z = first.index.z; z <= last.index.z; ++z)
+        for (int y = first.index.y; y <= last.index.y; ++y)
+            for (int x = first.index.x; x <= last.index.x; ++x) {
+                const FamilyId family{level, {x, y, z}};
+                const BrickId id = bricks_of(tree, family).front();
+                const Box coded = box_of(tree, family);
+                try {
+                    const Mask mask = decode_mask(ByteReader(family_stream(id)).block(), coded.dims());
+                    copy_box(intersect(own_box(tree, family), box), reinterpret_cast<const std::byte*>(mask.data()), coded,
+                             reinterpret_cast<std::byte*>(out.data()), box, 1);
+                } catch (const Error& e) {
+                    fail_damaged(id, e);
+                }
+            }
+}
+
 std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const {
     check_stop(stop);
     const TreeDesc& tree = index_.tree;
@@ -101,21 +144,17 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     for (auto& plane : planes) plane.resize(count);
     Buffer voxels;  // above level 0
     try {
-        const FamilyPlace& place = index_.families[std::size_t(id.level)]
-                                                  [place_in(families_of(tree, id.level), family.index)];
-        const auto bytes = payload_.bytes.subspan(std::size_t(place.offset), std::size_t(place.size));
-        if (check_of(bytes) != place.check) fail("its checksum is wrong");
         FamilyCodec::Planes low;
         if (parent) low = parent_planes(tree, *parent);
-        // A family that is not stored reads as empty streams.
-        static const Bytes nothing(64);
-        ByteReader in(place.size ? bytes : std::span(nothing));
+        const auto bytes = family_stream(id);
+        ByteReader in(bytes);
+        if (volume.has_mask) in.block();
         codec.decode(family, low, in, planes);
         if (id.level == 0) {
             FamilyCodec::crop(planes, box, own);
             fine.resize(own.voxels() * volume.voxel_bytes());
             codec.to_voxels(planes, own.voxels(), fine.data());
-            if (place.size) {
+            if (in.left() > 0 && !is_nothing(bytes)) {
                 decode_distances(volume.type, in.block(), fine.data(), own.voxels() * components);
                 decode_patches(volume.type, in.bytes(in.left()), fine.data(), own.voxels() * components);
             }
@@ -123,8 +162,7 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
             voxels = tree_voxels(tree, planes, count);
         }
     } catch (const Error& e) {
-        fail("the compressed data of brick {} {} {} of level {} is damaged ({}); get the file again", id.index.x,
-             id.index.y, id.index.z, id.level, e.what());
+        fail_damaged(id, e);
     }
 
     Buffer state;

@@ -34,6 +34,7 @@ class WaveletBricks final : public Bricks {
     std::optional<BrickId> parent(BrickId id) const override { return desc().coarser(id); }
     std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const override;
     std::uint64_t family_bytes(BrickId id) const override;
+    void read_mask(int level, const Box& box, std::span<std::uint8_t> out) const override;
     std::uint64_t resident_bytes() const override;
 
     const TreeIndex& index() const { return index_; }
@@ -42,6 +43,9 @@ class WaveletBricks final : public Bricks {
     void forget(std::uint64_t offset, std::uint64_t size) const { payload_.forget(offset, size); }
 
   private:
+    // The bytes of the family of a brick, checked; those of one that is not stored read as empty streams.
+    std::span<const std::byte> family_stream(BrickId id) const;
+
 
     TreeIndex index_;
     Payload payload_;

@@ -102,10 +102,6 @@ NodeType encode_node() {
         const ValueDesc* input = node.input("volume");
         const VolumeDesc* volume = input ? input->volume() : nullptr;
         if (!volume) return;
-        if (volume->has_mask) {
-            node.problem("a volume with a validity mask cannot be encoded; write NaN into what is not valid, as floats", "volume");
-            return;
-        }
         node.output("bricks", plan(*volume, options_of(node.params())).bricks);
         const std::uint64_t memory = options_of(node.params()).memory;
         const auto samples = double(volume->voxels()) * volume->components;
@@ -131,7 +127,9 @@ fixed Huffman code of the paper, `fast` static interleaved rANS over blocks of 4
 The volume is read slab by slab. Coarse levels and compressed bytes that go beyond `memory` wait in temporary files
 ($TMPDIR) without a name; the result does not depend on it.
 
-Floats pass through a 24-bit map of their range; `lossless` adds the exact distance of every voxel. NaN and infinities are kept
+Floats pass through a 24-bit map of their range; `lossless` adds the exact distance of every voxel, but where all
+values are multiples of one 1/10^n or 1/2^n, which are integers already. A validity mask is kept exactly; what is not
+valid is filled from around it and costs next to nothing. NaN and infinities are kept
 in every mode; coarse levels show the last value before them.
 
 **When to use.** For volumes that are explored at several resolutions, or larger than memory once decoded.
