@@ -178,7 +178,7 @@ gpu::TexturePtr page_table(const BricksDesc& desc, const std::vector<Page>& page
         t[0] = glm::vec4(lo, float(step));
         t[1] = glm::vec4(hi, std::log2(float(step)));
         t[2] = glm::vec4(glm::vec3(p.brick.index * desc.brick * stride), p.parent ? 1.0f : 0.0f);
-        t[3] = glm::vec4(glm::vec3(atlas.texel_of(p.brick)), 0.0f);
+        t[3] = glm::vec4(glm::vec3(atlas.texel_of(p.brick)), float(p.brick.level));
         t[4] = glm::vec4(1.0f / glm::vec3(stride), 0.0f);
         if (!p.parent) continue;
         const glm::ivec3 coarse = desc.levels[std::size_t(p.parent->level)].stride;
@@ -297,12 +297,6 @@ void find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, cons
     scene.occupancy = texture;
 }
 
-gpu::Module brick_module() {
-    for (const gpu::Module& m : modules())
-        if (m.name == "source-bricks") return m;
-    fail("shader module 'source-bricks' is not built in");
-}
-
 }  // namespace
 
 BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request,
@@ -343,7 +337,7 @@ BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, c
     scene.slot_hi = glm::vec3(desc.brick + request.apron.above - 1);
 
     auto field = std::make_shared<gpu::FieldSource>();
-    field->voxels.glsl = brick_module();
+    field->voxels.glsl = module("source-bricks");
     field->voxels.linear = true;
     field->voxels.color = desc.volume.color;
     field->voxels.has_validity = atlas->layout().validity;

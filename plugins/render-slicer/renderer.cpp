@@ -13,6 +13,7 @@
 #include "plugins/render-slicer/brick_scene.h"
 #include "plugins/render-slicer/keep.h"
 #include "plugins/render-slicer/modules.h"
+#include "plugins/render-slicer/picture.h"
 #include "plugins/render-slicer/tables.h"
 #include "plugins/render-slicer/view.h"
 #include "plugins/render-slicer/voxels.h"
@@ -361,23 +362,6 @@ Prepared prepare(const Scene& scene, const View& view, const VolumeDesc& desc, b
 
 // --- the shader --------------------------------------------------------------------------------
 
-Module module(std::string_view name) {
-    for (const Module& m : modules())
-        if (m.name == name) return m;
-    fail("shader module '{}' is not built in", name);
-}
-
-// The same functions over another texture: fetch_voxel becomes PREFIX_fetch_voxel.
-Module over(const Module& m, const std::string& prefix) {
-    Module out{m.name + " (" + prefix + ")", m.text};
-    for (std::string_view name : {"fetch_voxel", "sample_linear", "reconstruct", "dense_"})
-        for (std::size_t at = 0; (at = out.text.find(name, at)) != std::string::npos;) {
-            out.text.insert(at, prefix + "_");
-            at += prefix.size() + 1 + name.size();
-        }
-    return out;
-}
-
 // The scene's lights as the shader wants them: those at the eye, where halfway is no other direction,
 // are one and cheap.
 struct Lighting {
@@ -441,7 +425,7 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
     choose(lighting.at_eye, "EYE_LIGHT");
     choose(p.bricks && p.bricks->blended, "BLENDED");
     choose(p.bricks && p.bricks->steps > 1, "STEPS");
-    choose(p.bricks && p.slabs, "LEVEL_TABLES");
+    choose(p.bricks && p.bricks->steps > 1 && p.slabs, "LEVEL_TABLES");
     // Planes to the next slice, index steps to the next voxel, the way to a plane's voxels.
     choices += p.bricks ? "#define PLANE_STEP page_step\n#define VOXEL_STEP (1.0 / page_scale)\n"
                           "#define VISIT(m) open_page(ray_at(m))\n#define MARCH march_bricks\n"
@@ -568,33 +552,6 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
 
 // --- drawing -----------------------------------------------------------------------------------
 
-struct Target {
-    explicit Target(glm::ivec2 pixels)
-        : size(pixels),
-          color(gpu::make_texture(GL_TEXTURE_2D, GL_RGBA32F, {pixels, 1}, GL_NEAREST, "the picture")),
-          samples(gpu::make_texture(GL_TEXTURE_2D, GL_R32F, {pixels, 1}, GL_NEAREST, "the picture")),
-          framebuffer(gpu::make_framebuffer()), vertices(gpu::make_vertex_array()) {
-        glNamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT0, color.name(), 0);
-        glNamedFramebufferTexture(framebuffer.name(), GL_COLOR_ATTACHMENT1, samples.name(), 0);
-        const GLenum buffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-        glNamedFramebufferDrawBuffers(framebuffer.name(), 2, buffers);
-    }
-    glm::ivec2 size;
-    gpu::Texture color, samples;
-    gpu::Object framebuffer, vertices;
-};
-
-// A target of the size last asked for is kept. Only ever used on the OpenGL thread.
-const Target& target_of(glm::ivec2 size) {
-    static Target* last = nullptr;
-    if (!last || last->size != size) {
-        delete last;
-        last = nullptr;
-        last = new Target(size);
-    }
-    return *last;
-}
-
 // Draws what the volume can cover, in batches of rows that end often enough for a cancellation to be
 // prompt; the rest is background.
 void draw(const gpu::Program& program, const Target& target, const View& view, glm::vec4 background,
@@ -641,14 +598,6 @@ void draw(const gpu::Program& program, const Target& target, const View& view, g
     glDisable(GL_SCISSOR_TEST);
     gpu::check_errors("drawing");
     ev.add_draw_seconds(double(wall_ns() - begin) * 1e-9);
-}
-
-std::shared_ptr<Image> read_back(const Target& target) {
-    auto image = std::make_shared<Image>(target.size, Image::Format::rgba32f);
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer.name());
-    glReadBuffer(GL_COLOR_ATTACHMENT0);
-    glReadPixels(0, 0, target.size.x, target.size.y, GL_RGBA, GL_FLOAT, image->bytes().data());
-    return image;
 }
 
 void count_samples(const Target& target, Evaluation& ev) {

@@ -1,5 +1,6 @@
 // slicer.render: the node, as its description and the way from parameters to settings.
 #include "core/plugin/plugin.h"
+#include "plugins/render-slicer/plane.h"
 #include "plugins/render-slicer/renderer.h"
 
 namespace voxloom::slicer {
@@ -172,7 +173,10 @@ Efficient Pre-Integration, 2004.)";
     return t;
 }
 
-void add_nodes(Registry& registry) { registry.add(render_node()); }
+void add_nodes(Registry& registry) {
+    registry.add(render_node());
+    registry.add(plane_node());
+}
 
 }  // namespace
 

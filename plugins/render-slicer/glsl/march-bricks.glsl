@@ -4,6 +4,7 @@
 // Planes: far enough beyond a face for a float to be on its other side. Where it is not, the ray goes on
 // that far on the page it had.
 float ahead_of(float m) { return m + 1e-3 + 4e-6 * abs(m); }
+bool there = false;          // something is drawn on the open page
 float drawn_to = -1e30;     // slices of coarse pages may be further apart than the caller's planes
 void march_bricks(float k, float end) {
     float first = ray_first, last = ray_last, length_of_slab = slab_length;
@@ -11,7 +12,10 @@ void march_bricks(float k, float end) {
     vec3 inverse = 1.0 / mix(ray_step, vec3(1.0), level_with);
     float m = max(on_ray(k), drawn_to), leave = on_ray(end);
     while (m < leave && !finished()) {
-        bool there = open_page(ray_at(ahead_of(m)));
+        // A ray that leapt within its page stays on it; opening one is dear.
+        vec3 p = ray_at(ahead_of(m));
+        bool stays = all(lessThanEqual(page_lo, p)) && all(lessThan(p, page_hi));
+        for (float turn = stays ? 1.0 : 0.0; turn < 1.0; turn += 1.0) there = open_page(p);
         vec3 out_at = (mix(page_lo, page_hi, greaterThan(ray_step, vec3(0.0))) - ray_point) * inverse;
         out_at = mix(out_at, vec3(1e30), level_with);
         float next = max(min(min(out_at.x, out_at.y), out_at.z), ahead_of(m));

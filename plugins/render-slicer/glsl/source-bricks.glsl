@@ -9,11 +9,12 @@ uniform sampler2D page_table;         // 10 texels a page, 4096 pages a column
 uniform vec3 cell_size;               // index coordinates
 uniform ivec3 cell_last;
 
-vec3 page_lo, page_hi;                // what is drawn on the page, index coordinates
+vec3 page_lo = vec3(1.0), page_hi = vec3(0.0);  // what is drawn on the page, index coordinates
 vec3 page_first;                      // the brick's first voxel, index coordinates
 vec3 page_scale = vec3(1.0);          // voxels of the brick per index step
 float page_step = 1.0;                // planes between two slices
 float page_layer = 0.0;               // log2 of that
+float page_level = 0.0;
 vec3 slot_at;                         // texel of the brick's first own voxel
 float page_blends = 0.0;              // 1: mixes in its parent
 vec3 parent_at, parent_from, parent_scale;
@@ -38,7 +39,9 @@ bool open_page(vec3 p) {
     page_step = lo.w;
     page_layer = hi.w;
     page_first = first.xyz;
-    slot_at = texelFetch(page_table, at + ivec2(3, 0), 0).xyz;
+    vec4 slot = texelFetch(page_table, at + ivec2(3, 0), 0);
+    slot_at = slot.xyz;
+    page_level = slot.w;
     page_scale = texelFetch(page_table, at + ivec2(4, 0), 0).xyz;
     // A cell at the volume's border reaches beyond it, as the ray ends there.
     page_lo = mix(mix(vec3(cell) * cell_size, vec3(-1e6), equal(cell, ivec3(0))), lo.xyz, bvec3(there));
