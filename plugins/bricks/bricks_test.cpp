@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
+#include "core/data/brick_cache.h"
 #include "core/data/dense_pyramid.h"
 #include "plugins/bricks/nodes.h"
 #include "tests/support/run_node.h"
@@ -73,6 +75,98 @@ TEST(PyramidNode, RefusesBricksThatCannotBeBeforeAnyWork) {
     const auto described = describe_node(node, params_from_yaml(node, "{brick: [1, 1, 1]}"), {{"volume", {huge}}});
     ASSERT_EQ(described.problems.size(), 1u);
     EXPECT_THAT(described.problems[0], HasSubstr("take larger bricks"));
+}
+
+// A codec that rounds to multiples of 4 and counts what it decodes.
+class Rounding final : public Bricks {
+  public:
+    explicit Rounding(VolumePtr volume) : Bricks(describe_flat(volume->desc())), volume_(std::move(volume)) {}
+    BrickInfo info(BrickId) const override {
+        BrickInfo info;
+        info.range = {0, 65532};
+        info.l2 = info.octant_l2[0] = 3;
+        info.max_error = 2;
+        info.compressed_bytes = 100;
+        info.exact_error = true;
+        return info;
+    }
+    std::optional<BrickId> parent(BrickId) const override { return std::nullopt; }
+    std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels*, const std::stop_token& stop) const override {
+        ++decoded;
+        const Box box = desc().box_of(id);
+        auto brick = std::make_shared<BrickVoxels>();
+        brick->stored = box.dims();
+        brick->voxels = Buffer(box.voxels() * 2);
+        volume_->read(box, brick->voxels.bytes(), stop);
+        for (auto& v : brick->voxels.as<std::uint16_t>()) v = std::uint16_t((v + 2) / 4 * 4);
+        return {{id, brick}};
+    }
+    mutable std::atomic<int> decoded{0};
+
+  private:
+    static BricksDesc describe_flat(const VolumeDesc& volume) {
+        BricksDesc desc;
+        desc.volume = volume;
+        desc.volume.range.reset();
+        desc.brick = glm::ivec3(8);
+        desc.tree_type = volume.type;
+        desc.levels = pyramid_levels(volume, desc.brick, true);
+        desc.compressed_bytes = 1000;
+        return desc;
+    }
+    VolumePtr volume_;
+};
+
+NodeRun pyramid_of(const BricksPtr& bricks, const std::string& params) {
+    const NodeType node = pyramid_node();
+    return run_node(node, params_from_yaml(node, params), {{"volume", {bricks}}});
+}
+std::vector<std::byte> level_bytes(const BricksPtr& bricks, int level) {
+    BrickCache cache(64 << 20);
+    const Index3 dims = bricks->desc().levels[std::size_t(level)].dims;
+    std::vector<std::byte> bytes(Box::of(dims).voxels() * bricks->desc().volume.voxel_bytes());
+    read_region(bricks, level, Box::of(dims), bytes, cache);
+    return bytes;
+}
+
+TEST(PyramidNode, OverACodecItsLevelsAreThoseOfWhatTheCodecDecodesTo) {
+    const auto codec = std::make_shared<const Rounding>(ramp());
+    const VolumePtr rounded = make_volume({40, 30, 20}, ScalarType::u16, [](auto x, auto y, auto z) {
+        return double((x + 40 * y + 1200 * z + 2) / 4 * 4);
+    }, {1, 2, 3});
+    for (const char* filter : {"average", "lifting53", "subsample"}) {  // lifting53 has wider voxels than the codec
+        const auto over = pyramid_of(codec, std::string("{filter: ") + filter + "}").output<Bricks>("bricks");
+        const auto dense = pyramid(rounded, std::string("{brick: [8, 8, 8], filter: ") + filter + "}").output<Bricks>("bricks");
+        ASSERT_EQ(over->desc().levels.size(), dense->desc().levels.size());
+        for (int l = 0; l < int(over->desc().levels.size()); ++l) EXPECT_EQ(level_bytes(over, l), level_bytes(dense, l));
+        EXPECT_EQ(over->desc().compressed_bytes, dense->desc().compressed_bytes - rounded->desc().dense_bytes() + 1000);
+    }
+}
+
+TEST(PyramidNode, OverACodecErrorsCountWhatTheCodecLost) {
+    const auto codec = std::make_shared<const Rounding>(ramp());
+    const auto over = pyramid_of(codec, "{}").output<Bricks>("bricks");
+    EXPECT_EQ(over->info({0, {1, 2, 0}}).l2, 3);
+    EXPECT_TRUE(over->info({0, {1, 2, 0}}).exact_error);
+    const auto dense = make_dense_pyramid(level_as_volume(codec, 0, BrickCache::global()), glm::ivec3(8), PyramidFilter::average);
+    // x alone is halved: two bricks of level 0 to one of level 1, an octant each.
+    const BrickInfo joined = over->info({1, {0, 1, 1}}), alone = dense->info({1, {0, 1, 1}});
+    EXPECT_NEAR(joined.l2, std::sqrt(alone.l2 * alone.l2 + 18), 1e-9);
+    EXPECT_NEAR(joined.octant_l2[1], std::sqrt(alone.octant_l2[1] * alone.octant_l2[1] + 9), 1e-9);
+    EXPECT_EQ(joined.octant_l2[2], 0);
+    EXPECT_EQ(joined.max_error, alone.max_error + 2);
+    EXPECT_FALSE(joined.exact_error);
+}
+
+TEST(PyramidNode, OverACodecABrickOfLevelZeroIsDecodedOnDemandAndNoneForCoarserOnes) {
+    const auto codec = std::make_shared<const Rounding>(ramp());
+    const auto over = pyramid_of(codec, "{}").output<Bricks>("bricks");
+    const int before = codec->decoded;
+    BrickCache cache(1 << 20);
+    cache.get(over, {1, {0, 0, 0}});
+    EXPECT_EQ(codec->decoded, before);
+    cache.get(over, {0, {1, 1, 1}});
+    EXPECT_EQ(codec->decoded, before + 1);
 }
 
 TEST(DecodeNode, LevelZeroIsTheVolumeDenseOrStreamed) {

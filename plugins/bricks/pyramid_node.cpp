@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/data/dense_pyramid.h"
+#include "plugins/bricks/coarse_levels.h"
 #include "plugins/bricks/nodes.h"
 
 namespace voxloom::bricks {
@@ -27,9 +27,13 @@ infinities and masked voxels take no part: the remaining weights are renormalise
 Every brick knows its range of values, and the exact L2 and maximum error of drawing it, interpolated
 linearly, in place of the volume, for each octant too. That takes a second walk over the volume.
 
-**Use it** to draw volumes that are not compressed by level of detail, and as the uncompressed peer in
+Given bricks of a codec, level 0 stays compressed and is decoded when it is asked for; only the coarser levels, made of
+what it decodes to, are in memory. Errors count what the codec lost: those of level 0 are the codec's own, and the
+coarser ones' are joined with them as if both were independent.
+
+**Use it** to draw volumes by level of detail that no codec gives, and as the uncompressed peer in
 comparisons of codecs. The volume itself stays where it is: of a file that reads by region only the
-coarse levels, about a seventh, are held in memory. **Do not use it** where memory is short: nothing is
+coarse levels, about a seventh, are held in memory. **Do not use it** for a whole volume where memory is short: nothing is
 compressed. Small bricks follow the view and the transfer function more closely, large ones cost less
 to manage and to draw.
 
@@ -48,6 +52,10 @@ void describe_pyramid(Description& d) {
     const ValueDesc* input = d.input("volume");
     d.output("bricks", PortType::bricks);
     if (!input || !input->volume()) return;
+    if (const auto* bricks = std::get_if<BricksDesc>(&input->detail)) {
+        d.output("bricks", coarse_levels_desc(*bricks, filter_of(d.params())));
+        return;
+    }
     try {
         d.output("bricks", dense_pyramid_desc(*input->volume(), glm::ivec3(d.params().index3("brick")),
                                               filter_of(d.params())));
@@ -57,9 +65,12 @@ void describe_pyramid(Description& d) {
 }
 
 void evaluate_pyramid(Evaluation& e) {
-    const BricksPtr bricks = make_dense_pyramid(
-        e.input<Volume>("volume"), glm::ivec3(e.params().index3("brick")), filter_of(e.params()), e.stop(),
-        [&](double fraction) { e.progress(fraction, "building levels"); });
+    const PyramidFilter filter = filter_of(e.params());
+    const auto tell = [&](double fraction) { e.progress(fraction, "building levels"); };
+    const BricksPtr source = e.input<Bricks>("volume");
+    const BricksPtr bricks =
+        source ? with_coarse_levels(source, filter, e.stop(), tell)
+               : make_dense_pyramid(e.input<Volume>("volume"), glm::ivec3(e.params().index3("brick")), filter, e.stop(), tell);
     const BricksDesc& desc = bricks->desc();
     const double values = double(desc.volume.voxels()) * desc.volume.components;
     double count = 0;
@@ -87,16 +98,17 @@ NodeType pyramid_node() {
     NodeType node;
     node.id = "bricks.pyramid";
     node.title = "Pyramid";
-    node.doc = "Builds the levels of detail of an uncompressed volume, with the exact error of every brick.";
+    node.doc = "Builds the levels of detail of a volume, or of bricks of any codec, with the error of every brick.";
     node.keywords = {"level of detail", "LOD", "multiresolution", "mipmap", "octree", "downsample", "average"};
-    node.inputs = {{"volume", PortType::volume, "The finest level."}};
-    node.outputs = {{"bricks", PortType::bricks, "The volume and all coarser levels."}};
+    node.inputs = {{"volume", {PortType::volume, PortType::bricks},
+                    "The finest level; of bricks that have levels themselves, level 0."}};
+    node.outputs = {{"bricks", PortType::bricks, "The finest level and all coarser ones."}};
     node.params = {
         param::choice("filter", {"average", "lifting53", "subsample"}, "average",
                       "What a coarse sample is made of: (1 2 1)/4, the lowpass of the 5/3 wavelet, or the "
                       "fine sample as it is.")
             .is_quality(),
-        param::vector("brick", {32, 32, 32}, "Voxels of a brick along x, y and z.")
+        param::vector("brick", {32, 32, 32}, "Voxels of a brick along x, y and z; of Bricks, theirs are kept.")
             .range(1, 4096).slider(8, 128, Scale::logarithmic).whole().in_unit("voxels"),
     };
     node.method = kMethod;
