@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "plugins/codec-baseline/codec.h"
@@ -63,6 +64,9 @@ Field field_of(const Form& form, zfp_type type, void* data) {
                              : zfp_field_3d(data, type, n[0], n[1], n[2]));
 }
 Stream stream_of(const Form& form, const Setting& setting, zfp_type type) {
+    // Of forged files too: what zfp would make of other numbers is not defined.
+    const double most = setting.mode == kRate ? 128 : setting.mode == kPrecision ? 64 : std::numeric_limits<double>::max();
+    if (setting.mode != kReversible && !(setting.amount > 0 && setting.amount <= most)) fail("its zfp setting is out of range");
     Stream stream(zfp_stream_open(nullptr));
     switch (setting.mode) {
         case kReversible: zfp_stream_set_reversible(stream.get()); break;
