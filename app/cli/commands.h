@@ -64,6 +64,7 @@ struct CompressArguments {
     std::string faces;                       // empty: the codec's own choice
     int brick = 0;                           // 0: the codec's own choice
     std::uint64_t memory = 0;                // bytes; 0: the codec's own choice
+    std::vector<std::string> overrides;      // PARAM=VALUE of the encoder
     bool json = false;
     bool quiet = false;
 };

@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "core/base/error.h"
+#include "core/base/output_file.h"
 
 namespace voxloom::cli {
 
@@ -33,6 +35,11 @@ void require_writable(const fs::path& folder, std::string_view option) {
     if (access(there.c_str(), W_OK | X_OK) != 0)
         fail("{} {}: {} cannot be written to ({}); choose another place", option, folder.string(), there.string(),
              std::error_code(errno, std::generic_category()).message());
+}
+
+bool names_ending(const NodeType& type, const fs::path& file) {
+    const std::string ending = extension_of(file);
+    return !ending.empty() && std::ranges::find(type.keywords, ending.substr(1)) != type.keywords.end();
 }
 
 }  // namespace voxloom::cli

@@ -5,9 +5,11 @@
 #include <cstdio>
 
 #include "app/cli/commands.h"
+#include "app/cli/files.h"
 #include "app/cli/progress.h"
 #include "app/cli/session.h"
 #include "core/base/text.h"
+#include "core/data/brick_file.h"
 #include "core/graph/report.h"
 
 namespace voxloom::cli {
@@ -134,8 +136,8 @@ int info(const InfoArguments& arguments, std::stop_token stop) {
     for (const NodeType* type : openers) {
         const Plan plan = plan_to_open(*type, arguments.file, registry);
         if (!plan.problems.empty()) {
-            // The reader of single volumes has the most to say of what is wrong with a file.
-            if (first_problem.empty() || type->id == "readers.volume")
+            // What opens files of that ending, else the reader of single volumes, has the most to say of what is wrong.
+            if (first_problem.empty() || type->id == "readers.volume" || names_ending(*type, arguments.file))
                 first_problem = plan.problems.front().message;
             continue;
         }
@@ -145,6 +147,7 @@ int info(const InfoArguments& arguments, std::stop_token stop) {
         }
         fmt::print("{} (opened by {})\n", arguments.file.string(), type->id);
         print_desc(plan.nodes.front().outputs.front());
+        if (const auto made_by = provenance_of(arguments.file)) fmt::print("  made by      {}\n", *made_by);
         for (const std::string& warning : plan.warnings) fmt::print(stderr, "warning: {}\n", warning);
         if (arguments.values) {
             ResultCache cache;

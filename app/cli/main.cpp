@@ -121,13 +121,16 @@ int main(int argc, char** argv) {
     cli::CompressArguments compress;
     command = app.add_subcommand("compress", "Compress a volume to a file");
     command->add_option("in", compress.in, "A volume: a file, or a folder of slices")->required();
-    command->add_option("out", compress.out, "The file to write, such as volume.vxw")->required();
-    command->add_option("--codec", compress.codec, "The codec")->capture_default_str();
+    command->add_option("out", compress.out, "The file to write, such as volume.vxw, or .vxb of codecs other than wavelet")
+        ->required();
+    command->add_option("--codec", compress.codec, "The codec: a NAME of which there are nodes NAME.encode and NAME.write")
+        ->capture_default_str();
     command->add_option("--coder", compress.coder, "The codec's entropy coder, such as dense or fast");
     command->add_option("--brick", compress.brick, "Voxels of a brick along each axis");
     command->add_option("--faces", compress.faces, "How neighbouring bricks meet, such as block or shared");
     command->add_option("--memory", compress.memory, "Memory that encoding may take, such as 500M or 2G")
         ->transform(CLI::AsSizeValue(false));
+    command->add_option("--set", compress.overrides, "PARAM=VALUE of the encoder, whatever it has");
     CLI::Option_group* target = command->add_option_group("target", "What to reach; without, nothing is lost");
     target->require_option(0, 1);
     target->add_flag_callback("--lossless", [&] { compress.target = "lossless"; }, "Every bit comes back");
@@ -142,10 +145,13 @@ int main(int argc, char** argv) {
     aim("--max-error", "max-error", "max_error", "No voxel is further off than this");
     aim("--bpv", "bpv", "bpv", "Bits a voxel, everything included");
     aim("--ratio", "ratio", "ratio", "Bytes of the original over bytes of the file");
+    aim("--precision", "precision", "precision", "Bit planes that are kept, of codecs that count them");
+    aim("--distance", "distance", "distance", "Visual distance, of codecs that know one; 1 is just not seen");
     aim("--threshold", "threshold", "threshold", "Wavelet coefficients below this are dropped");
     command->add_flag("--json", compress.json, "The report on standard output");
     command->add_flag("--quiet", compress.quiet, "No progress");
-    command->footer("Example: voxloom compress head.nrrd head.vxw --psnr 50");
+    command->footer("Examples: voxloom compress head.nrrd head.vxw --psnr 50\n"
+                    "          voxloom compress head.nrrd head.vxb --codec blosc --coder lz4 --set level=9");
     command->callback([&] { status = cli::compress(compress, stop_source.get_token()); });
 
     cli::DecompressArguments decompress;

@@ -241,6 +241,37 @@ TEST_F(Cli, compressAndDecompressGiveTheSameFileBack) {
     EXPECT_LT(fs::file_size(folder.path() / "v.vxw"), lossless);
 }
 
+TEST_F(Cli, everyCodecCompressesAndTellsWhatIsInside) {
+    std::string voxels(20 * 17 * 9, '\0');
+    for (std::size_t i = 0; i < voxels.size(); ++i) voxels[i] = char(i * i % 51);
+    write("v.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 20 17 9\nencoding: raw\n\n" + voxels);
+    for (const std::string codec : {"raw", "zfp", "blosc", "jpeg2000", "jpegls", "jpegxl"}) {
+        if (run("nodes " + codec + ".encode").status != 0) continue;  // its library is not there
+        const Ran packed = run("compress v.nrrd v.vxb --brick 16 --codec " + codec);
+        EXPECT_EQ(packed.status, 0) << packed.err;
+        EXPECT_THAT(run("info v.vxb").out, AllOf(HasSubstr(codec + ".encode"), HasSubstr("16 x 16 x 16"), HasSubstr("20 x 17 x 9")));
+        EXPECT_EQ(run("decompress v.vxb back.nrrd").status, 0);
+        EXPECT_THAT(slurp(folder.path() / "back.nrrd"), ::testing::EndsWith(voxels)) << codec;
+    }
+}
+
+TEST_F(Cli, optionsThatACodecDoesNotHaveAreSaid) {
+    write("v.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 1\nencoding: raw\n\nabcd");
+    if (run("nodes blosc.encode").status == 0) {
+        EXPECT_EQ(run("compress v.nrrd v.vxb --codec blosc --coder lz4 --set level=9").status, 0);
+        EXPECT_THAT(run("compress v.nrrd v.vxb --codec blosc --psnr 50").err, HasSubstr("takes no --psnr"));
+        EXPECT_THAT(run("compress v.nrrd v.vxb --codec blosc --coder lz5").err, HasSubstr("lz4"));
+        EXPECT_THAT(run("compress v.nrrd v.vxb --codec blosc --set leve=1").err, HasSubstr("did you mean 'level'?"));
+    }
+    EXPECT_THAT(run("compress v.nrrd v.vxb --codec raw --coder lz4").err, HasSubstr("has no --coder"));
+    if (run("nodes zfp.encode").status == 0) {
+        EXPECT_THAT(run("compress v.nrrd v.vxb --codec zfp --threshold 3").err, AllOf(HasSubstr("no --threshold"), HasSubstr("--psnr")));
+    }
+    write("bad.vxb", "voxbrick and then nothing");
+    for (const char* command : {"decompress bad.vxb b.nrrd", "info bad.vxb"})
+        EXPECT_THAT(run(command).err, HasSubstr("not a brick file")) << command;
+}
+
 TEST_F(Cli, compressingNonsenseIsOneSentence) {
     EXPECT_EQ(run("compress a.nrrd b.vxw --psnr 40 --lossless").status, 2);
     EXPECT_THAT(run("compress a.nrrd b.vxw --codec none").err, HasSubstr("no codec 'none'"));
