@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 
-from pictures import SOURCE, data_folder
+from data import SOURCE, data_folder
 
 VOLUMES = ["engine", "cranium-ct", "turbulence-wmag"]
 # Cubes as they come, and for codecs of pictures whole slices too, which suit them better.
@@ -129,7 +129,7 @@ def write(rows, command, folder):
     lines = ["# Codecs side by side", "", f"Measured in one run of `{command}`, on one machine. MB/s are of the original's bytes "
              "over CPU time, so per core: encoding is one pass of the codec, `with search` all that the node did. `two threads` "
              "is how much faster two threads read everything than one. A region of 32^3 is read by one thread, warm with its "
-             "bricks' ancestors decoded, cold with nothing. Bits hold everything that a file holds. Bricks are 64^3, `slices` "
+             "bricks' ancestors decoded, cold with nothing. Bits hold everything that a file holds. The peers' bricks are 64^3, `slices` "
              "whole slices, which codecs of pictures compress best and fetch slowest.", "",
              "![Rate against error](codecs-rate.svg)", "", "![Decoding speed against error](codecs-speed.svg)"]
     for volume in dict.fromkeys(r["volume"] for r in rows):

@@ -9,14 +9,7 @@ import sys
 
 import numpy as np
 
-SOURCE = pathlib.Path(__file__).resolve().parent.parent
-
-
-def data_folder():
-    """Real volumes: $VOXLOOM_DATA, else ../shared/data beside the source folder; None without."""
-    given = os.environ.get("VOXLOOM_DATA")
-    folder = pathlib.Path(given) if given else SOURCE.parent / "shared" / "data"
-    return folder if folder.is_dir() else None
+from data import SOURCE, data_folder
 
 
 def yaml(value):
