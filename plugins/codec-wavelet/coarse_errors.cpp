@@ -149,16 +149,20 @@ class Measured final : public CoarseErrors {
         // x
         std::vector<Real> rows(plane * std::size_t(n.z));
         const VoxelView view{samples.box, reinterpret_cast<const std::byte*>(samples.plane(c)), sizeof(Real)};
+        std::vector<std::size_t> left(width), right(width);
+        std::vector<Real> weight(width);
         for (std::size_t x = 0; x < width; ++x) {
             const Corner cx = corner(desc, box.lo.x + std::int64_t(x), 0);
-            const auto a = std::size_t(cx.first - need.lo.x), b = cx.f > 0 ? a + 1 : a;
-            const Real f = Real(cx.f);
-            for (std::int64_t z = 0; z < n.z; ++z)
-                for (std::int64_t y = 0; y < n.y; ++y) {
-                    const auto* from = reinterpret_cast<const Real*>(view.row(need.lo.x, need.lo.y + y, need.lo.z + z));
-                    rows[std::size_t(z) * plane + std::size_t(y) * width + x] = from[a] * (1 - f) + from[b] * f;
-                }
+            left[x] = std::size_t(cx.first - need.lo.x);
+            right[x] = cx.f > 0 ? left[x] + 1 : left[x];
+            weight[x] = Real(cx.f);
         }
+        Real* to = rows.data();
+        for (std::int64_t z = need.lo.z; z < need.hi.z; ++z)
+            for (std::int64_t y = need.lo.y; y < need.hi.y; ++y, to += width) {
+                const auto* from = reinterpret_cast<const Real*>(view.row(need.lo.x, y, z));
+                for (std::size_t x = 0; x < width; ++x) to[x] = from[left[x]] * (1 - weight[x]) + from[right[x]] * weight[x];
+            }
 
         const Index3 brick(tree_.bricks.brick);
         std::vector<Real> between(plane), squares(width), largest(width);
