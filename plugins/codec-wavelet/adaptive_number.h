@@ -9,27 +9,33 @@
 
 namespace voxloom::wavelet {
 
-// A number's length in bits goes through an adaptive tree chosen by the last number's length, the two
+// A number's length in bits goes through an adaptive tree chosen by the context, the two
 // bits below the leading one are adaptive, too, the others stand as they are.
 class AdaptiveNumber {
   public:
-    // Returns what was coded; `number` is not looked at by a decoder.
+    // The last number's length is the context.
     template <class Coding, class Key>
     Key code(Coding& coding, Key number) {
+        const Key got = code(coding, number, last_);
+        last_ = std::bit_width(got);
+        return got;
+    }
+    // Returns what was coded; `number` is not looked at by a decoder. Contexts are 0 to 64.
+    template <class Coding, class Key>
+    Key code(Coding& coding, Key number, int context) {
         const int bits = Coding::kDecodes ? 0 : std::bit_width(number);
         unsigned node = 1;
         for (int i = 6; i >= 0; --i)
-            node = node << 1 | unsigned(one(coding, length_[std::size_t(last_)][node], bits >> i & 1));
+            node = node << 1 | unsigned(one(coding, length_[std::size_t(context)][node], bits >> i & 1));
         const int got = int(node) - 128;
         if (got > int(8 * sizeof(Key))) fail("a number is out of range");
-        last_ = got;
         if (got == 0) return 0;
         Key value = 1;
         for (int i = got - 2; i >= 0; --i) {
             const bool bit = number >> i & 1;
             const int depth = got - 2 - i;
-            const std::size_t context = depth ? 1 + std::size_t(value & 1) : 0;
-            const bool b = depth < 2 ? one(coding, top_[std::size_t(got)][context], bit) : coding.code(bit, 32768);
+            const std::size_t above = depth ? 1 + std::size_t(value & 1) : 0;
+            const bool b = depth < 2 ? one(coding, top_[std::size_t(got)][above], bit) : coding.code(bit, 32768);
             value = Key(Key(value << 1) | Key(b));
         }
         return value;

@@ -340,15 +340,20 @@ TEST_F(WaveletFile, ComesBackAsItWasWritten) {
     EXPECT_EQ(opened->desc().volume.significant_bits, 12);
     EXPECT_EQ(opened->desc().volume.index_to_world, desc.index_to_world);
     EXPECT_EQ(opened->index().tree.provenance, made->index().tree.provenance);
+    const double outward = made->index().tree.quantiser.step * made->index().tree.map.step / 8;
     for (int l = 0; l < int(made->desc().levels.size()); ++l) {
         EXPECT_EQ(decoded(opened, l), decoded(made, l));
         for (std::size_t i = 0; i < made->index().infos[std::size_t(l)].size(); ++i) {
             const BrickInfo &a = made->index().infos[std::size_t(l)][i], &b = opened->index().infos[std::size_t(l)][i];
-            EXPECT_EQ(a.range, b.range);
+            EXPECT_LE(b.range.min, a.range.min);
+            EXPECT_GE(b.range.max, a.range.max);
+            EXPECT_NEAR(a.range.min, b.range.min, outward);
+            EXPECT_NEAR(a.range.max, b.range.max, outward);
             EXPECT_EQ(a.compressed_bytes, b.compressed_bytes);
-            EXPECT_NEAR(a.l2, b.l2, 0.004 * a.l2);
+            EXPECT_NEAR(a.l2, b.l2, 0.022 * a.l2);
             EXPECT_GE(b.max_error * (1 + 1e-12), a.max_error);
-            EXPECT_NEAR(a.max_error, b.max_error, 0.006 * a.max_error);
+            EXPECT_NEAR(a.max_error, b.max_error, 0.045 * a.max_error);
+            for (std::size_t o = 0; o < 8; ++o) EXPECT_NEAR(a.octant_l2[o], b.octant_l2[o], 0.04 * a.l2);
         }
     }
 }
@@ -396,7 +401,7 @@ TEST_F(WaveletFile, GoldenFilesOfEachVersionStayReadable) {
     for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::fast})
         for (ScalarType type : {ScalarType::u8, ScalarType::i32, ScalarType::f32}) {
             const VolumePtr volume = make_volume({21, 9, 12}, type, value, {1, 1, 1.6});
-            for (const char* version : {"v1", "v2"}) {
+            for (const char* version : {"v1", "v2", "v4"}) {
                 const std::filesystem::path golden = std::filesystem::path(VOXLOOM_SOURCE_DIR) / "plugins/codec-wavelet/golden" /
                     fmt::format("{}-{}-{}.vxw", version, name_of(coder), voxloom::name_of(type));
                 if (std::getenv("VOXLOOM_WRITE_GOLDEN") && version == fmt::format("v{}", kFileVersion)) {

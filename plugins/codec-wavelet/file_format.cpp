@@ -8,9 +8,9 @@
 #include "core/base/error.h"
 #include "core/base/hash.h"
 #include "core/base/output_file.h"
-#include "plugins/codec-wavelet/adaptive_number.h"
 #include "plugins/codec-wavelet/byte_io.h"
 #include "plugins/codec-wavelet/passes.h"
+#include "plugins/codec-wavelet/statistics_code.h"
 
 namespace voxloom::wavelet {
 
@@ -20,120 +20,6 @@ constexpr char kMagic[8] = {'v', 'o', 'x', 'w', 'a', 'v', 'e', '\n'};
 constexpr std::uint32_t kEndian = 0x01020304;
 // magic, version, byte order, bytes of head and payload, hash of the 32 bytes before and the head
 constexpr std::size_t kPreamble = sizeof kMagic + 4 + 4 + 8 + 8 + 8;
-
-// --- statistics: columns of small numbers, each coded as the difference from the one before ---------
-
-void encode_column(std::span<const std::uint16_t> column, ByteWriter& writer) {
-    Bytes part;
-    RangeEncoder encoder(part);
-    AdaptiveNumber model;
-    std::uint16_t last = 0;
-    for (const std::uint16_t v : column) {
-        const auto d = std::int16_t(v - last);
-        model.code(encoder, std::uint16_t(d < 0 ? ~(d * 2) : d * 2));
-        last = v;
-    }
-    encoder.finish();
-    writer.block(part);
-}
-std::vector<std::uint16_t> decode_column(std::size_t count, ByteReader& reader) {
-    RangeDecoder decoder(reader.block());
-    AdaptiveNumber model;
-    std::vector<std::uint16_t> column(count);
-    std::uint16_t last = 0;
-    for (std::uint16_t& v : column) {
-        const auto folded = model.code(decoder, std::uint16_t(0));
-        v = last = std::uint16_t(last + (folded & 1 ? ~(folded >> 1) : folded >> 1));
-    }
-    return column;
-}
-
-// Errors on a logarithmic scale, 128 steps an octave: 0.3 % either way, and 0 is 0.
-std::uint16_t error_code(double error, bool up) {
-    if (!(error > 0)) return 0;
-    const double x = (std::log2(error) + 200) * 128;
-    return std::uint16_t(std::clamp(up ? std::ceil(x) : std::round(x), 1.0, 65535.0));
-}
-double from_error_code(std::uint16_t code) { return code ? std::exp2(code / 128.0 - 200) : 0; }
-
-// Values on 65536 levels between the smallest and the largest, exact for integers of 16 bits; rounded outward.
-struct RangeScale {
-    double lo = 0, step = 1;
-    std::uint16_t below(double v) const {
-        auto code = std::int64_t(std::clamp(std::floor((v - lo) / step), 0.0, 65535.0));
-        while (code > 0 && value(code) > v) --code;
-        return std::uint16_t(code);
-    }
-    std::uint16_t above(double v) const {
-        auto code = std::int64_t(std::clamp(std::ceil((v - lo) / step), 0.0, 65535.0));
-        while (code < 65535 && value(code) < v) ++code;
-        return std::uint16_t(code);
-    }
-    double value(std::int64_t code) const { return lo + double(code) * step; }
-};
-
-RangeScale scale_of(const TreeIndex& index) {
-    double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-    for (const auto& level : index.infos)
-        for (const BrickInfo& info : level) {
-            lo = std::min(lo, info.range.min);
-            hi = std::max(hi, info.range.max);
-        }
-    if (!(lo <= hi)) return {};
-    RangeScale scale{lo, 1};
-    if (is_float(index.tree.bricks.volume.type) || hi - lo > 65535) {
-        scale.step = hi / 65535 - lo / 65535;
-        while (scale.value(65535) < hi) scale.step = std::nextafter(scale.step, std::numeric_limits<double>::infinity());
-    }
-    if (!(scale.step > 0)) scale.step = 1;
-    return scale;
-}
-
-void write_statistics(const TreeIndex& index, ByteWriter& writer) {
-    const RangeScale scale = scale_of(index);
-    writer.number(scale.lo);
-    writer.number(scale.step);
-    for (std::size_t l = 0; l < index.infos.size(); ++l) {
-        const auto& infos = index.infos[l];
-        std::vector<std::uint16_t> column(infos.size());
-        auto write = [&](auto&& code) {
-            std::transform(infos.begin(), infos.end(), column.begin(), code);
-            encode_column(column, writer);
-        };
-        write([&](const BrickInfo& i) { return scale.below(i.range.min); });
-        write([&](const BrickInfo& i) { return std::uint16_t(scale.above(i.range.max) - scale.below(i.range.min)); });
-        write([](const BrickInfo& i) { return error_code(i.l2, false); });
-        write([](const BrickInfo& i) { return error_code(i.max_error, true); });
-        for (std::size_t o = 0; o < 8 && l > 0; ++o)
-            write([o](const BrickInfo& i) { return std::uint16_t(i.l2 > 0 ? std::lround(255 * i.octant_l2[o] / i.l2) : 0); });
-    }
-}
-
-void read_statistics(TreeIndex& index, ByteReader& reader) {
-    RangeScale scale;
-    scale.lo = reader.number<double>();
-    scale.step = reader.number<double>();
-    for (std::size_t l = 0; l < index.infos.size(); ++l) {
-        auto& infos = index.infos[l];
-        auto read = [&](auto&& use) {
-            const auto column = decode_column(infos.size(), reader);
-            for (std::size_t i = 0; i < infos.size(); ++i) use(infos[i], column[i]);
-        };
-        std::vector<std::uint16_t> low(infos.size());
-        read([&](BrickInfo& i, std::uint16_t v) { low[std::size_t(&i - infos.data())] = v; i.range.min = scale.value(v); });
-        read([&](BrickInfo& i, std::uint16_t v) {
-            i.range.max = scale.value(std::int64_t(low[std::size_t(&i - infos.data())]) + v);
-        });
-        read([](BrickInfo& i, std::uint16_t v) { i.l2 = from_error_code(v); });
-        read([](BrickInfo& i, std::uint16_t v) { i.max_error = from_error_code(v); });
-        for (std::size_t o = 0; o < 8 && l > 0; ++o)
-            read([o](BrickInfo& i, std::uint16_t v) { i.octant_l2[o] = i.l2 * v / 255; });
-        for (BrickInfo& i : infos) {
-            if (l == 0) i.octant_l2[0] = i.l2;
-            i.exact_error = true;
-        }
-    }
-}
 
 // --- head --------------------------------------------------------------------------------------------
 
@@ -273,7 +159,7 @@ TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload, std:
         }
     }
     if (offset != payload) fail("its index does not cover its data");
-    read_statistics(index, r);
+    read_statistics(index, r, version);
     if (r.left() > 0) fail("its head is longer than it should be");
     return index;
 }

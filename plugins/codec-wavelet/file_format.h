@@ -9,7 +9,7 @@
 
 namespace voxloom::wavelet {
 
-inline constexpr std::uint32_t kFileVersion = 3;  // what is written; 1 is read, too
+inline constexpr std::uint32_t kFileVersion = 4;  // what is written; all before are read, too
 
 // Bytes that a file with this index and so long a payload has.
 std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload);
