@@ -19,6 +19,7 @@
 #include <cstring>
 
 #include "core/base/error.h"
+#include "plugins/codec-wavelet/parent_trend.h"
 #include "plugins/codec-wavelet/range_coder.h"
 #include "plugins/codec-wavelet/token.h"
 
@@ -31,8 +32,16 @@ constexpr int kInputs = 6;
 constexpr int kMixers = 9;                 // sets of weights, chosen by the neighbours' sizes
 constexpr int kBlock = 4;
 
-// token_of() for a context: no more than `levels` classes.
-int level_of(std::uint32_t m, int levels) { return std::min(token_of(m), levels - 1); }
+// token_of() for a context: no more than `levels` classes, which are up to 20.
+constexpr std::size_t kTabled = 1024;
+const std::array<std::uint8_t, kTabled> kTokens = [] {
+    std::array<std::uint8_t, kTabled> tokens{};
+    for (std::size_t m = 0; m < kTabled; ++m) tokens[m] = std::uint8_t(token_of(std::uint32_t(m)));
+    return tokens;
+}();
+int level_of(std::uint32_t m, int levels) {
+    return std::min<int>(kTokens[std::min<std::size_t>(m, kTabled - 1)], levels - 1);
+}
 
 struct Model {
     Chance near_cross[3][20][7][kSteps];
@@ -92,34 +101,16 @@ class Padded {
 
 // Everything a pass over a family needs beside the model; kept by each thread.
 struct Workspace {
-    std::array<Padded<std::uint16_t>, 8> size;  // |q| of each band, bands on one common grid
+    // Of the band that is being coded, |q| and its sign; all bands stand on one common grid.
+    Padded<std::uint16_t> size;
     Padded<std::int8_t> sign;
-    std::array<std::vector<std::int32_t>, 3> curvature, slope;  // of the parent, along each axis
-    std::array<std::vector<std::uint8_t>, 8> block_used;
-    std::vector<std::int32_t> curve_here, slope_here, foretold;
+    std::vector<std::size_t> found;          // its places that are not zero
+    std::vector<std::uint8_t> block_used;
+    // Sums over the bands that are coded already: at a place, and at its six neighbours.
+    Padded<std::uint32_t> across, beyond;
+    std::vector<std::uint8_t> blocks_across;
+    ParentTrend trend;
 };
-
-// s[i-1] - s[i] - s[i+1] + s[i+2] and |s[i+1] - s[i]| along an axis, at the odd samples between.
-void parent_derivatives(const Details& d, int axis, std::vector<std::int32_t>& curvature,
-                        std::vector<std::int32_t>& slope) {
-    const glm::ivec3 n = d.shape.low();
-    const std::size_t stride = axis == 0 ? 1 : axis == 1 ? std::size_t(n.x) : std::size_t(n.x) * std::size_t(n.y);
-    const std::size_t count = std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z);
-    curvature.resize(count);
-    slope.resize(count);
-    std::size_t i = 0;
-    for (int z = 0; z < n.z; ++z)
-        for (int y = 0; y < n.y; ++y)
-            for (int x = 0; x < n.x; ++x, ++i) {
-                const int at = axis == 0 ? x : axis == 1 ? y : z, last = n[axis] - 1;
-                const std::int64_t b = d.low[i], c = at < last ? d.low[i + stride] : b;
-                const std::int64_t a = at > 0 ? d.low[i - stride] : b - (c - b);
-                const std::int64_t e = at + 2 <= last ? d.low[i + 2 * stride] : c + (c - b);
-                constexpr std::int64_t most = 1 << 30;
-                curvature[i] = std::int32_t(std::clamp(a - b - c + e, -most, most));
-                slope[i] = std::int32_t(std::min(std::abs(c - b), most));
-            }
-}
 
 template <class Coding>
 class Pass {
@@ -129,18 +120,15 @@ class Pass {
 
     void run() {
         const glm::ivec3 low = d_.shape.low();
-        for (int a = 0; a < 3; ++a)
-            if (d_.shape.halved[a]) parent_derivatives(d_, a, space_.curvature[std::size_t(a)], space_.slope[std::size_t(a)]);
-        done_ = 0;
+        space_.trend.look_at(d_);
+        blocks_ = (low + kBlock - 1) / kBlock;
+        space_.across.reset(low);
+        space_.beyond.reset(low);
+        space_.blocks_across.assign(std::size_t(blocks_.x) * std::size_t(blocks_.y) * std::size_t(blocks_.z), 0);
         for (int mask : kBandOrder) {
             const Band band = d_.shape.band(mask);
             if (!d_.shape.has(band)) continue;
-            space_.size[std::size_t(mask)].reset(low);
-            blocks_ = (low + kBlock - 1) / kBlock;
-            space_.block_used[std::size_t(mask)].assign(
-                std::size_t(blocks_.x) * std::size_t(blocks_.y) * std::size_t(blocks_.z), 0);
-            code_band(band);
-            done_ |= 1 << mask;
+            if (code_band(band)) remember_band();
         }
     }
 
@@ -152,7 +140,8 @@ class Pass {
     }
     std::int32_t& number(const Band& b, int x, int y, int z) const { return d_.q[d_.shape.at(b.lo + glm::ivec3(x, y, z))]; }
 
-    void code_band(const Band& b) {
+    // False for a band of zeros.
+    bool code_band(const Band& b) {
         bool any = false;
         if constexpr (!Coding::kDecodes)
             for (int z = 0; z < b.dims.z && !any; ++z)
@@ -164,45 +153,45 @@ class Pass {
             if constexpr (Coding::kDecodes)
                 for (int z = 0; z < b.dims.z; ++z)
                     for (int y = 0; y < b.dims.y; ++y) std::fill_n(&number(b, 0, y, z), b.dims.x, 0);
-            return;
+            return false;
         }
         type_ = std::popcount(unsigned(b.mask)) - 1;
-        foretell(b);
+        space_.trend.look_at(d_, b);
+        space_.size.reset(d_.shape.low());
         space_.sign.reset(d_.shape.low());
+        space_.block_used.assign(space_.blocks_across.size(), 0);
+        space_.found.clear();
         code_blocks(b);
         for (int z = 0; z < b.dims.z; ++z)
             for (int y = 0; y < b.dims.y; ++y)
-                for (int x = 0; x < b.dims.x; ++x) {
-                    if (space_.block_used[std::size_t(b.mask)][block_at(x, y, z)])
-                        code_number(b, x, y, z);
+                for (int x = 0; x < b.dims.x; x += kBlock) {
+                    const int end = std::min(x + kBlock, b.dims.x);
+                    if (space_.block_used[block_at(x, y, z)])
+                        for (int i = x; i < end; ++i) code_number(b, i, y, z);
                     else if constexpr (Coding::kDecodes)
-                        number(b, x, y, z) = 0;
+                        std::fill(&number(b, x, y, z), &number(b, x, y, z) + (end - x), 0);
                 }
+        return true;
     }
 
-    // What the parent says of each place of the band, in units of the band's step.
-    void foretell(const Band& b) {
-        const std::size_t count = space_.curvature[0].size() | space_.curvature[1].size() | space_.curvature[2].size();
-        space_.curve_here.assign(count, 0);
-        space_.slope_here.assign(count, 0);
-        space_.foretold.assign(count, 0);
-        // 8 levels a step; the band's numbers are -1/16 of the curvature along each of its axes.
-        const std::int64_t scale = std::int64_t(65536.0 * 8 / std::max(1.0, d_.step[std::size_t(b.mask)]));
-        for (int a = 0; a < 3; ++a) {
-            if (!(b.mask >> a & 1) || !d_.shape.halved[a]) continue;
-            const auto& curvature = space_.curvature[std::size_t(a)];
-            const auto& slope = space_.slope[std::size_t(a)];
-            constexpr std::int64_t most = 1 << 24;
-            for (std::size_t i = 0; i < curvature.size(); ++i) {
-                const std::int64_t c = std::clamp(curvature[i] * scale >> 16, -most, most);
-                space_.curve_here[i] += std::int32_t(std::abs(c));
-                space_.slope_here[i] += std::int32_t(std::min(slope[i] * scale >> 16, most));
-                space_.foretold[i] = std::int32_t(-c);
+    // Adds what was found to the sums that later bands look at.
+    void remember_band() {
+        auto& across = space_.across;
+        auto& beyond = space_.beyond;
+        const std::size_t row = across.row(), plane = across.plane();
+        for (const std::size_t i : space_.found) {
+            const std::uint32_t size = space_.size[i];
+            across[i] += size;
+            for (const std::size_t step : {std::size_t(1), row, plane}) {
+                beyond[i - step] += size;
+                beyond[i + step] += size;
             }
         }
-        for (auto& v : space_.curve_here) v = level_of(std::uint32_t(v) / 4, 64);
-        for (auto& v : space_.slope_here) v = level_of(std::uint32_t(v) / 4, 64);
+        for (std::size_t i = 0; i < space_.block_used.size(); ++i) space_.blocks_across[i] += space_.block_used[i];
     }
+
+    // Classes of the trend at a place.
+    static int steep(std::int32_t here, int levels) { return level_of(std::uint32_t(here) / 4, levels); }
 
     std::size_t block_at(int x, int y, int z) const {
         return (std::size_t(z / kBlock) * std::size_t(blocks_.y) + std::size_t(y / kBlock)) * std::size_t(blocks_.x) +
@@ -210,51 +199,46 @@ class Pass {
     }
 
     void code_blocks(const Band& b) {
-        auto& used = space_.block_used[std::size_t(b.mask)];
+        auto& used = space_.block_used;
         const glm::ivec3 n = (b.dims + kBlock - 1) / kBlock;
         for (int z = 0; z < n.z; ++z)
             for (int y = 0; y < n.y; ++y)
                 for (int x = 0; x < n.x; ++x) {
                     const glm::ivec3 lo = glm::ivec3(x, y, z) * kBlock, hi = glm::min(lo + kBlock, b.dims);
                     const std::size_t here = block_at(lo.x, lo.y, lo.z);
-                    int nearby = 0, across = 0, curve = 0;
+                    int nearby = 0;
+                    std::int32_t curve = 0;
                     if (x > 0) nearby += used[here - 1];
                     if (y > 0) nearby += used[here - std::size_t(blocks_.x)];
                     if (z > 0) nearby += used[here - std::size_t(blocks_.x) * std::size_t(blocks_.y)];
-                    for (int m = 1; m < 8; ++m)
-                        if (done_ >> m & 1) across += space_.block_used[std::size_t(m)][here];
                     bool any = false;
                     for (int k = lo.z; k < hi.z; ++k)
                         for (int j = lo.y; j < hi.y; ++j)
                             for (int i = lo.x; i < hi.x; ++i) {
-                                curve = std::max(curve, space_.curve_here[place(i, j, k)]);
+                                curve = std::max(curve, space_.trend.curve[place(i, j, k)]);
                                 if constexpr (!Coding::kDecodes) any = any || number(b, i, j, k) != 0;
                             }
-                    used[here] = code_one(coding_, model_.block[type_][nearby][std::min(across, 4)][std::min(curve, 9)], any);
+                    const int across = std::min<int>(space_.blocks_across[here], 4);
+                    used[here] = code_one(coding_, model_.block[type_][nearby][across][steep(curve, 10)], any);
                 }
     }
 
     void code_number(const Band& b, int x, int y, int z) {
-        auto& size = space_.size[std::size_t(b.mask)];
+        auto& size = space_.size;
         const std::size_t i = size.at(x, y, z), row = size.row(), plane = size.plane();
         const std::uint32_t w = size[i - 1], n = size[i - row], u = size[i - plane];
         const std::uint32_t around = size[i - row - 1] + size[i - row + 1] + size[i - plane - 1] + size[i - plane + 1] +
                                      size[i - plane - row] + size[i - plane + row];
         const std::uint32_t nearby = 2 * (w + n + u) + around;
-        std::uint32_t across = 0, beyond = 0;
-        for (int m = 1; m < 8; ++m)
-            if (done_ >> m & 1) {
-                const auto& other = space_.size[std::size_t(m)];
-                across += other[i];
-                beyond += other[i - 1] + other[i + 1] + other[i - row] + other[i + row] + other[i - plane] + other[i + plane];
-            }
-        const int curve = space_.curve_here[place(x, y, z)], slope = space_.slope_here[place(x, y, z)];
+        const std::uint32_t across = space_.across[i], beyond = space_.beyond[i];
+        const std::size_t at = place(x, y, z);
+        const int curve = steep(space_.trend.curve[at], 14), slope = steep(space_.trend.slope[at], 14);
         const int nearby_class = level_of(nearby, 20), rough = level_of(nearby / 2, 12);
         Chance* const contexts[kInputs - 1] = {
             model_.near_cross[type_][nearby_class][level_of(across, 7)],
             model_.three[type_][level_of(w, 6)][level_of(n, 6)][level_of(u, 6)],
-            model_.curve[type_][std::min(curve, 13)][rough],
-            model_.slope[type_][std::min(slope, 13)][rough],
+            model_.curve[type_][curve][rough],
+            model_.slope[type_][slope][rough],
             model_.across[b.mask - 1][level_of(2 * across + beyond, 16)][level_of(nearby, 8)],
         };
 
@@ -284,9 +268,10 @@ class Pass {
             q = 0;
             return;
         }
-        const bool negative = code_sign(b, x, y, z, i, q < 0);
+        const bool negative = code_sign(b, at, i, q < 0);
         if constexpr (Coding::kDecodes) q = negative ? -std::int32_t(value) : std::int32_t(value);
         size[i] = std::uint16_t(std::min<std::uint32_t>(value, 4095));
+        space_.found.push_back(i);
         space_.sign[i] = negative ? -1 : 1;
     }
 
@@ -310,11 +295,11 @@ class Pass {
         return more;
     }
 
-    bool code_sign(const Band& b, int x, int y, int z, std::size_t i, bool negative) {
+    bool code_sign(const Band& b, std::size_t at, std::size_t i, bool negative) {
         const auto& sign = space_.sign;
         int foretold = 4;
         if (std::popcount(unsigned(b.mask)) == 1) {
-            const int f = space_.foretold[place(x, y, z)];
+            const int f = space_.trend.foretold[at];
             const int strength = std::min(4, (token_of(std::uint32_t(std::abs(f)) / 8) + 1) / 2);
             foretold = 4 + (f < 0 ? -strength : strength);
         }
@@ -327,7 +312,6 @@ class Pass {
     Model& model_;
     Workspace& space_;
     Details& d_;
-    int done_ = 0;  // bit m: band m is coded
     int any_band_ = 1;
     int type_ = 0;
     glm::ivec3 blocks_{0};
@@ -394,20 +378,25 @@ class DenseCoder final : public Coder {
     void encode(const Details& details, Bytes& out) const override {
         if (all_zero(details)) return;
         RangeEncoder encoder(out);
-        auto model = std::make_unique<Model>((*models_)[details.finest]);
-        run(encoder, *model, details);
+        run(encoder, fresh_model(details), details);
         encoder.finish();
     }
     void decode(std::span<const std::byte> in, Details& details) const override {
         if (in.empty()) return clear_bands(details);
         RangeDecoder decoder(in);
-        auto model = std::make_unique<Model>((*models_)[details.finest]);
-        run(decoder, *model, details);
+        run(decoder, fresh_model(details), details);
     }
 
   private:
     static constexpr std::size_t kChances = offsetof(Model, weights) / sizeof(Chance);
     static Chance* chances(Model& model) { return reinterpret_cast<Chance*>(&model); }
+
+    // A copy to learn in, which each thread keeps: memory of this size is dear to get anew.
+    Model& fresh_model(const Details& details) const {
+        thread_local const auto model = std::make_unique<Model>();
+        *model = (*models_)[details.finest];
+        return *model;
+    }
 
     template <class Coding>
     static void run(Coding& coding, Model& model, const Details& details) {
