@@ -2,9 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <fstream>
 #include <random>
 
+#include "app/editor/model/autosave.h"
+#include "app/editor/model/camera_control.h"
 #include "app/editor/model/commands.h"
+#include "app/editor/model/histogram.h"
+#include "app/editor/model/param_values.h"
 #include "app/editor/model/search.h"
 #include "app/editor/model/settings.h"
 #include "core/base/error.h"
@@ -245,6 +251,158 @@ TEST(Workspace, settingsComeBack) {
     EXPECT_EQ(back.recent, settings.recent);
     EXPECT_EQ(back.recent.front(), folder.path() / "g 15.yaml");
     EXPECT_EQ(load_settings(folder.path() / "none").recent.size(), 0u);
+}
+
+TEST(Autosave, bringsBackWhatACrashedSessionHadNotSaved) {
+    voxloom::testing::TempFolder folder;
+    Workspace work = workspace_of(kChain);
+    save_workspace(work, folder.path() / "g.yaml", registry());
+    {
+        Autosave autosave(folder.path() / "state");
+        autosave.update(work, 0);
+        EXPECT_FALSE(std::filesystem::exists(folder.path() / "state")) << "nothing is unsaved";
+        work.document.remove_node("add");
+        autosave.update(work, 10);
+        work.document.remove_node("table");
+        autosave.update(work, 10.5);
+        EXPECT_TRUE(autosave.due());
+        autosave.update(work, 11);
+        EXPECT_FALSE(autosave.due());
+        EXPECT_TRUE(find_recoverable(folder.path() / "state").empty()) << "this session still runs";
+        // As if another process had written it, which is gone.
+        const auto entry = *std::filesystem::directory_iterator(folder.path() / "state");
+        std::filesystem::copy_file(entry.path(), folder.path() / "state/999999999.unsaved");
+        std::ofstream(folder.path() / "state/999999998.unsaved") << "no graph";
+    }
+    const auto found = find_recoverable(folder.path() / "state");
+    ASSERT_EQ(found.size(), 1u) << "the session that ended well left nothing";
+    EXPECT_EQ(found[0].workspace.document.text(), work.document.text());
+    EXPECT_EQ(found[0].workspace.file, std::filesystem::absolute(folder.path() / "g.yaml"));
+    EXPECT_TRUE(found[0].workspace.changed());
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "state/999999998.unsaved"));
+}
+
+// --- histograms ----------------------------------------------------------------------------------
+
+TEST(Histogram, countsEveryVoxelOfASmallVolume) {
+    using voxloom::testing::make_volume;
+    const auto ramp = make_volume({256, 3, 2}, ScalarType::u8, [](auto x, auto, auto) { return double(x); });
+    const Histogram h = histogram_of(*ramp);
+    EXPECT_EQ(h.range, (ValueRange{0, 255}));
+    EXPECT_FALSE(h.sampled);
+    for (double count : h.counts) EXPECT_EQ(count, 6);
+    const Histogram constant = histogram_of(*make_volume({5, 1, 1}, ScalarType::f32, [](auto...) { return 7; }));
+    EXPECT_EQ(constant.range, (ValueRange{7, 7}));
+    EXPECT_EQ(constant.counts[0], 5);
+    EXPECT_EQ(histogram_of(*make_volume({0, 3, 3}, ScalarType::u8, [](auto...) { return 0; })).range, ValueRange{});
+}
+
+TEST(Histogram, leavesOutWhatIsNotFiniteAndSurvivesExtremes) {
+    const double values[] = {NAN, INFINITY, -INFINITY, -1e308, 1e308, 0};
+    const auto volume = voxloom::testing::make_volume({6, 1, 1}, ScalarType::f64, [&](auto x, auto, auto) { return values[x]; });
+    const Histogram h = histogram_of(*volume);
+    EXPECT_EQ(h.range, (ValueRange{-1e308, 1e308}));
+    double all = 0;
+    for (double count : h.counts) all += count;
+    EXPECT_EQ(all, 3);
+    EXPECT_EQ(h.counts[128], 1);
+}
+
+TEST(Histogram, readsAPartOfLargeVolumesAndSaysSo) {
+    const auto volume = voxloom::testing::make_volume({16, 16, 16}, ScalarType::u16, [](auto x, auto y, auto z) { return double(x + y + z); });
+    const Histogram h = histogram_of(*volume, {}, 512);
+    EXPECT_TRUE(h.sampled);
+    double all = 0;
+    for (double count : h.counts) all += count;
+    EXPECT_GT(all, 256);
+    EXPECT_LT(all, 1024);
+}
+
+// --- the camera ----------------------------------------------------------------------------------
+
+struct CameraControl : ::testing::Test {
+    Registry nodes;
+    Workspace work;
+
+    CameraControl() {
+        NodeType camera;
+        camera.id = "test.camera";
+        camera.title = camera.doc = "test";
+        camera.outputs = {{"camera", PortType::camera, "the camera"}};
+        camera.params = {param::choice("mode", {"orbit", "look-at"}, "orbit", "Mode."),
+                         param::real("azimuth", 30, "Azimuth.").range(-36000, 36000), param::real("elevation", 20, "Elevation."),
+                         param::real("roll", 0, "Roll."), param::real("distance", 1, "Distance."),
+                         param::real("zoom", 1, "Zoom.").range(1e-3, 1e6), param::real("fov", 30, "Angle."),
+                         param::vector("offset", {0, 0, 0}, "Offset."), param::vector("eye", {0, -3, 0}, "Eye."),
+                         param::vector("target", {0, 0, 0}, "Target."), param::vector("up", {0, 0, 1}, "Up.")};
+        NodeType draw;
+        draw.id = "test.draw";
+        draw.title = draw.doc = "test";
+        draw.inputs = {{"camera", PortType::camera, "the camera"}};
+        draw.outputs = {{"image", PortType::image, "the picture"}};
+        for (NodeType* type : {&camera, &draw}) {
+            type->evaluate = [](Evaluation&) {};
+            nodes.add(*type);
+        }
+        work.document.add_node("eye", "test.camera");
+        work.document.add_node("view", "test.draw");
+        work.document.connect("eye", "camera", "view", "camera");
+    }
+    double real(const char* key) const {
+        return std::get<double>(value_of(*work.graph().find("eye"), *nodes.find("test.camera")->find_param(key)));
+    }
+    std::vector<double> numbers(const char* key) const {
+        return std::get<std::vector<double>>(value_of(*work.graph().find("eye"), *nodes.find("test.camera")->find_param(key)));
+    }
+};
+
+TEST_F(CameraControl, findsTheCameraBehindAPicture) {
+    EXPECT_EQ(camera_of(work.graph(), nodes, "view"), "eye");
+    work.document.disconnect("view", "camera");
+    EXPECT_FALSE(camera_of(work.graph(), nodes, "view"));
+    EXPECT_FALSE(camera_of(work.graph(), nodes, "nothing"));
+}
+
+TEST_F(CameraControl, turnsByAnglesWithinTheirRangeInOneStep) {
+    const std::string before = work.document.text();
+    orbit(work, nodes, "eye", {40, 100});
+    EXPECT_EQ(real("azimuth"), -10);
+    EXPECT_EQ(real("elevation"), 90) << "no further than straight above";
+    work.document.undo();
+    EXPECT_EQ(work.document.text(), before);
+    orbit(work, nodes, "eye", {-160, 0});
+    EXPECT_EQ(real("azimuth"), -170) << "wrapped at half a turn";
+    look_from(work, nodes, "eye", 90, -90);
+    EXPECT_EQ(real("elevation"), -90);
+    magnify(work, nodes, "eye", 1e-9);
+    EXPECT_EQ(real("zoom"), 1e-3) << "no further than the range";
+    reset_camera(work, nodes, "eye");
+    EXPECT_EQ(work.document.text(), before);
+}
+
+TEST_F(CameraControl, goesAroundTheTargetAtTheSameDistance) {
+    work.document.set_param("eye", "mode", std::string("look-at"));
+    orbit(work, nodes, "eye", {90, 0});
+    std::vector<double> eye = numbers("eye");
+    EXPECT_NEAR(eye[0], -3, 1e-5);
+    EXPECT_NEAR(eye[1], 0, 1e-5);
+    orbit(work, nodes, "eye", {0, 30});
+    eye = numbers("eye");
+    EXPECT_NEAR(std::sqrt(eye[0] * eye[0] + eye[1] * eye[1] + eye[2] * eye[2]), 3, 1e-4);
+    EXPECT_NEAR(eye[2], 1.5, 1e-4) << "lifted by 30 degrees";
+}
+
+TEST_F(CameraControl, movesWhatIsSeenWithTheHand) {
+    // A unit sphere fitted at 30 degrees, seen along +y with z up: a picture is 2 tan(15) d high.
+    Camera now;
+    now.vertical_fov = glm::radians(30.0);
+    now.eye = {0, -1 / std::sin(glm::radians(15.0)), 0};
+    now.up = {0, 0, 1};
+    pan(work, nodes, "eye", {0.5, -0.25}, now);
+    const double height = 2 * std::tan(glm::radians(15.0)) * -now.eye.y;
+    EXPECT_NEAR(numbers("offset")[0], -0.5 * height, 1e-5);
+    EXPECT_NEAR(numbers("offset")[1], 0, 1e-9);
+    EXPECT_NEAR(numbers("offset")[2], -0.25 * height, 1e-5);
 }
 
 // --- undo ----------------------------------------------------------------------------------------

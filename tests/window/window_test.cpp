@@ -1,6 +1,7 @@
 // The editor as people meet it: a window, a mouse and keys.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -170,6 +171,162 @@ TEST_F(Window, unsavedChangesAreAskedFor) {
     editor.click("changes:save");
     EXPECT_EQ(editor.wait(), 0);
     EXPECT_EQ(Document::load(graph()).graph().find("tf"), nullptr);
+}
+
+TEST_F(Window, aCrashLosesNothing) {
+    VirtualDisplay display(1280, 720);
+    std::string unsaved;
+    {
+        EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+        editor.idle();
+        editor.click("node:tf");
+        editor.key("Delete");
+        unsaved = editor.wait_for("a change", [](const json& s) { return s["changed"].get<bool>(); })["text"];
+        for (int i = 0; i < 400 && !fs::exists(folder.path() / "e/state/voxloom"); ++i) usleep(25000);
+        editor.kill();
+    }
+    EXPECT_EQ(slurp(graph()), kGraph);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.with("recovery:recover");
+    keep(editor.screenshot(), "recovery");
+    editor.click("recovery:recover");
+    const json s = editor.wait_for("what was not saved", [&](const json& now) { return now["text"] == unsaved; });
+    EXPECT_TRUE(s["changed"].get<bool>());
+    EXPECT_EQ(s["file"], fs::absolute(graph()).string());
+}
+
+TEST_F(Window, theHandTurnsThePicture) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    json s = editor.wait_for("a picture", [](const json& now) { return shows_final(now, "view.image"); });
+    const auto serial = s["values"]["view.image"]["serial"].get<int>();
+    editor.move_to("picture");
+    editor.press();
+    editor.move_by(40, 10);
+    editor.move_by(40, 10);
+    s = editor.wait_for("another picture while the button is held", [&](const json& now) {
+        return now["values"]["view.image"]["serial"] > serial;
+    });
+    editor.release();
+    s = editor.wait_for("the final picture", [](const json& now) { return shows_final(now, "view.image"); });
+    EXPECT_NE(s["text"], kGraph);
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("elevation:"));
+    editor.key("z", "ctrl");
+    editor.wait_for("undo", [](const json& now) { return now["text"] == kGraph; });
+    editor.key("7");
+    editor.wait_for("the view from above", [](const json& now) { return now["text"].get<std::string>().find("elevation: 90") != std::string::npos; });
+}
+
+TEST_F(Window, aPresetIsTurnedIntoPointsThatAreDragged) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& now) { return shows_final(now, "view.image"); });
+    editor.click("node:tf");
+    editor.click("into-points");
+    json s = editor.with("point:tf.4");
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("preset: none"));
+    const std::string before = s["text"];
+    editor.move_to("point:tf.4");
+    editor.press();
+    editor.move_by(0, -15);
+    editor.move_by(4, -5);
+    editor.release();
+    s = editor.wait_for("another point", [&](const json& now) { return now["text"] != before && shows_final(now, "view.image"); });
+    EXPECT_EQ(s["problems"], 0);
+    keep(editor.screenshot(), "transfer");
+}
+
+TEST_F(Window, picturesOfTwoBranchesAreComparedWithLinkedCameras) {
+    std::string text = kGraph;
+    text += R"(  - id: other-camera
+    type: scene.camera
+    in:  { fit: head.volume }
+    set: { azimuth: 40, framing: box }
+    at: [220, 360]
+  - id: coarse
+    type: slicer.render
+    in:  { source: head.volume, transfer: tf.transfer, camera: other-camera.camera }
+    set: { size: [120, 120], slice_distance: 4 }
+    at: [480, 200]
+  - id: error
+    type: metrics.image
+    in:  { image: coarse.image, reference: view.image }
+    at: [740, 200]
+)";
+    text.replace(text.find("[view.image]"), 12, "[view.image, coarse.image, error.table]");
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    auto both = [](const json& s) { return shows_final(s, "view.image") && shows_final(s, "coarse.image"); };
+    editor.wait_for("two pictures", both);
+    editor.key("c");
+    editor.with("picture:1");
+    editor.move_to("picture:0", 0.5, 0.6);
+    editor.press();
+    editor.move_by(20, 0);
+    editor.move_by(20, 0);
+    editor.release();
+    const json s = editor.wait_for("two other pictures", [&](const json& now) { return now["text"] != text && both(now); });
+    const Document turned = Document::parse(s["text"]);
+    auto azimuth = [&](const char* id) { return turned.graph().find(id)->params.at(0).yaml.text; };
+    EXPECT_NE(azimuth("camera"), "40");
+    EXPECT_EQ(azimuth("camera"), azimuth("other-camera"));
+    keep(editor.screenshot(), "two");
+    editor.key("c");
+    editor.move_to("picture:0", 0.5, 0.5);
+    keep(editor.screenshot(), "wipe");
+    editor.key("c");
+    editor.wait_for("the difference", both);
+    keep(editor.screenshot(), "difference");
+    editor.key("c");
+    editor.click("picture-port:0");
+    editor.click("show:error.table");
+    editor.wait_for("the table", [](const json& now) { return shows_final(now, "error.table"); });
+    keep(editor.screenshot(), "table");
+}
+
+// As somebody who has read nothing: every click, key and typed word counts.
+TEST_F(Window, aNewcomerComparesTwoCodecsOnTheEngineInFewActions) {
+    VOXLOOM_NEEDS_DATA(data);
+    VirtualDisplay display(1600, 900);
+    EditorProcess editor(display, folder.path() / "e", {"--size", "1600x900"});
+    int actions = 0;
+    auto click = [&](const std::string& item) {
+        editor.click(item);
+        ++actions;
+    };
+    click("example:codecs.yaml");
+    click("node:ct");
+    editor.click("param:ct.path", 0.1);
+    editor.key("a", "ctrl");
+    editor.type((data / "engine.nrrd").string());
+    editor.key("Return");
+    actions += 4;
+    auto both = [](const json& s) { return shows_final(s, "wavelet-view.image") && shows_final(s, "zfp-view.image"); };
+    json s = editor.wait_for("two pictures", both);
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("engine.nrrd"));
+    editor.key("c");  // side by side
+    ++actions;
+    click("node:wavelet");
+    editor.click("param:wavelet.max_error");
+    ++actions;
+    editor.move_to("picture:0", 0.4, 0.6);
+    editor.press();
+    editor.move_by(60, 0);
+    editor.release();
+    ++actions;
+    editor.wait_for("the turned pictures", both);
+    keep(editor.screenshot(), "newcomer-pictures");
+    editor.key("c");
+    editor.key("c");
+    editor.key("c");
+    click("picture-port:0");
+    click("show:errors.table");
+    actions += 3;
+    s = editor.wait_for("the table", [](const json& now) { return shows_final(now, "errors.table"); });
+    EXPECT_EQ(s["problems"], 0);
+    EXPECT_LE(actions, 25);
+    keep(editor.screenshot(), "newcomer-table");
 }
 
 TEST_F(Window, everythingIsReadableOnALargeScreen) {

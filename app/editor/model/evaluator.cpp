@@ -12,7 +12,9 @@ namespace voxloom::editor {
 
 namespace {
 
-bool is_shown(PortType type) { return type == PortType::image || type == PortType::table; }
+bool is_shown(PortType type) {
+    return type == PortType::image || type == PortType::table || type == PortType::camera || type == PortType::transfer;
+}
 
 std::optional<Plan::Source> source_of(const Plan& plan, const WireEnd& end) {
     const int node = plan.find(end.node);
@@ -96,6 +98,8 @@ void Evaluator::cancel() {
     runner_->cancel();
     std::lock_guard lock(mutex_);
     next_.reset();
+    cancelled_ = planning_;
+    newest_ = nullptr;
     running_ = running_coarse_ = state_.writing = false;
     for (auto& [id, status] : state_.nodes)
         if (status.state == NodeState::running) status.state = NodeState::cancelled;
@@ -131,6 +135,7 @@ void Evaluator::loop() {
         const Request request = std::move(*next_);
         next_.reset();
         planning_ = true;
+        cancelled_ = false;
         lock.unlock();
 
         Plan plan = check(request.graph, registry_);
@@ -139,9 +144,9 @@ void Evaluator::loop() {
         RunOptions options;
         options.wanted = wanted_of(plan, request);
         options.output_folder = request.output_folder;
-        const bool anything = !options.wanted.empty();
 
         lock.lock();
+        const bool anything = !options.wanted.empty() && !cancelled_;
         planning_ = false;
         running_ = anything;
         newest_ = plan.nodes.data();  // a vector that is moved keeps its elements where they are
@@ -218,9 +223,11 @@ void Evaluator::collect(const Plan::Node& node, const Hash& key, const ResultCac
         status.measurements = result.measurements;
         status.warnings = result.warnings;
     }
-    for (std::size_t o = 0; o < result.outputs.size(); ++o)
-        if (is_shown(voxloom::type_of(result.outputs[o])))
-            show(node.id + "." + node.type->outputs[o].key, result.outputs[o], fresh);
+    for (std::size_t o = 0; o < result.outputs.size(); ++o) {
+        const std::string port = node.id + "." + node.type->outputs[o].key;
+        if (auto* volume = std::get_if<VolumePtr>(&result.outputs[o])) state_.volumes[port] = *volume;
+        if (is_shown(voxloom::type_of(result.outputs[o]))) show(port, result.outputs[o], fresh);
+    }
 }
 
 // A run that was superseded may still end; what it brings must not replace what is newer.

@@ -59,7 +59,8 @@ class Evaluator final : RunObserver {
         bool busy = false;
         bool writing = false;                       // the request in progress writes files
         std::map<std::string, NodeStatus> nodes;
-        std::map<std::string, LiveValue> values;    // images and tables, by "node.port"
+        std::map<std::string, LiveValue> values;    // images, tables, cameras and transfer functions, by "node.port"
+        std::map<std::string, std::weak_ptr<const Volume>> volumes;  // as long as the cache keeps them
         std::vector<Problem> problems;
         std::vector<std::string> warnings;
         double wall_seconds = 0;                    // of the last whole run
@@ -103,6 +104,7 @@ class Evaluator final : RunObserver {
     State state_;
     std::optional<Request> next_;
     bool planning_ = false;          // a request was taken and not yet handed on
+    bool cancelled_ = false;         // it was cancelled meanwhile
     bool running_ = false, running_coarse_ = false;
     const Plan::Node* newest_ = nullptr;  // the nodes of the newest plan handed on: which one it is
     bool ending_ = false;

@@ -5,6 +5,8 @@
 
 #include <cassert>
 
+#include "app/editor/model/camera_control.h"
+
 namespace voxloom::editor {
 
 namespace {
@@ -65,6 +67,24 @@ void rescale(Editor& e, double factor) {
     e.theme_changed = true;
 }
 
+// The camera that the shown picture is made with.
+std::optional<std::string> shown_camera(const Editor& e) {
+    const std::vector<WireEnd> shown = shown_ports(e);
+    return shown.empty() ? std::nullopt : camera_of(e.work.graph(), e.registry, shown.front().node);
+}
+bool has_camera(const Editor& e) { return shown_camera(e).has_value(); }
+
+void compare(Editor& e) {
+    using Mode = Viewport::Mode;
+    Mode& mode = e.viewport.mode;
+    mode = mode == Mode::single ? Mode::two : mode == Mode::two ? Mode::wipe : mode == Mode::wipe ? Mode::difference : Mode::single;
+}
+
+template <int azimuth, int elevation>
+void look(Editor& e) {
+    edit(e, [&e] { look_from(e.work, e.registry, *shown_camera(e), azimuth, elevation); });
+}
+
 std::vector<Action> make_actions() {
     using E = Editor;
     return {
@@ -109,6 +129,17 @@ std::vector<Action> make_actions() {
          [](E& e) { e.evaluator.cancel(); }, [](const E& e) { return e.live.busy; }},
         {"fit-picture", "Picture", "Fit picture", "Shows the whole picture.", GLFW_KEY_HOME, false, false,
          [](E& e) { e.viewport.zoom = 0, e.viewport.offset = glm::dvec2(0.0); }},
+        {"compare", "Picture", "Compare", "One picture, two, one wiped over the other, or their difference, in turns.", GLFW_KEY_C, false, false, compare},
+        {"front", "Picture", "Front", "Looks from the front.", GLFW_KEY_1, false, false, look<0, 0>, has_camera},
+        {"back", "Picture", "Back", "Looks from the back.", GLFW_KEY_1, false, true, look<180, 0>, has_camera},
+        {"side", "Picture", "Side", "Looks from the right side of the picture's front.", GLFW_KEY_3, false, false, look<90, 0>, has_camera},
+        {"other-side", "Picture", "Other side", "Looks from the left side of the picture's front.", GLFW_KEY_3, false, true, look<-90, 0>, has_camera},
+        {"top", "Picture", "Top", "Looks from above.", GLFW_KEY_7, false, false, look<0, 90>, has_camera},
+        {"bottom", "Picture", "Bottom", "Looks from below.", GLFW_KEY_7, false, true, look<0, -90>, has_camera},
+        {"projection", "Picture", "Perspective", "Changes between perspective and parallel lines that stay parallel.", GLFW_KEY_5, false, false,
+         [](E& e) { edit(e, [&e] { toggle_projection(e.work, e.registry, *shown_camera(e)); }); }, has_camera},
+        {"reset-camera", "Picture", "Reset", "Puts the camera back to where its node has it by default.", GLFW_KEY_R, false, false,
+         [](E& e) { edit(e, [&e] { reset_camera(e.work, e.registry, *shown_camera(e)); }); }, has_camera},
         {"screenshot", "Picture", "Screenshot", "Saves the window as a PNG file in the output folder.", GLFW_KEY_F12, false, false,
          [](E& e) { e.screenshot_wanted = true; }},
         {"expert", "View", "Expert", "Shows the parameters for experts, too.", GLFW_KEY_E, true, false,

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "app/editor/view/canvas_drawing.h"
-#include "app/editor/view/editor.h"
+#include "app/editor/view/picture.h"
 #include "core/base/error.h"
 
 namespace voxloom::editor {
@@ -223,9 +223,9 @@ void press(Editor& editor, const Hit& hit, const std::vector<Wire>& wires, glm::
 void show_in_viewport(Editor& editor, int node) {
     const NodePorts& ports = editor.canvas.ports[std::size_t(node)];
     for (const PortSpec& port : ports.outputs)
-        if (ports.type && type_of(port) == PortType::image) {
-            editor.viewport.port = {editor.work.graph().nodes[std::size_t(node)].id, port.key, {}};
-            editor.viewport.zoom = 0;
+        if (ports.type && (type_of(port) == PortType::image || type_of(port) == PortType::table)) {
+            editor.viewport.pictures[0].port = {editor.work.graph().nodes[std::size_t(node)].id, port.key, {}};
+            return;
         }
 }
 
@@ -323,7 +323,14 @@ void show_tooltip(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     // A tooltip over every node would be in the way: what lies under a resting pointer only.
     static double still_since = 0;
     if (ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0) still_since = ImGui::GetTime();
-    if (ImGui::GetTime() - still_since > 0.4) tooltip(text);
+    if (ImGui::GetTime() - still_since < 0.4 || text.empty()) return;
+    ImGui::BeginTooltip();
+    ImGui::PushTextWrapPos(ui(340));
+    ImGui::TextUnformatted(text.c_str());
+    ImGui::PopTextWrapPos();
+    if (!hit.port && hit.node >= 0)
+        draw_thumbnail(editor, editor.work.graph().nodes[std::size_t(hit.node)].id, editor.canvas.ports[std::size_t(hit.node)], ui(180));
+    ImGui::EndTooltip();
 }
 
 void mark_everything(Editor& editor) {

@@ -221,6 +221,43 @@ void draw_changes_question(Editor& editor) {
     ImGui::EndPopup();
 }
 
+void draw_recovery_question(Editor& editor) {
+    if (editor.recovered.empty()) return;
+    if (std::exchange(editor.ask_about_recovery, false)) ImGui::OpenPopup("recovery");
+    const ImVec2 screen = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos({screen.x / 2, screen.y / 2}, 0, {0.5f, 0.5f});
+    if (!ImGui::BeginPopupModal("recovery", nullptr, kNoTitle | ImGuiWindowFlags_AlwaysAutoResize)) return;
+    const fs::path& file = editor.recovered.back().workspace.file;
+    ImGui::TextUnformatted("A session ended unexpectedly, with changes that were not saved:");
+    text_in(theme().accent, file.empty() ? "a graph without a file" : file.string().c_str());
+    ImGui::Dummy({ui(420), ui(6)});
+    auto answered = [&] {
+        std::error_code error;
+        fs::remove(editor.recovered.back().autosaved, error);
+        editor.recovered.pop_back();
+        ImGui::CloseCurrentPopup();
+        editor.ask_about_recovery = !editor.recovered.empty();
+    };
+    if (ImGui::Button("Recover")) {
+        begin_document(editor, std::move(editor.recovered.back().workspace));
+        answered();
+        // The others wait for the next start: they would take the place of this one.
+        editor.ask_about_recovery = false;
+        editor.recovered.clear();
+    }
+    mark(editor, "recovery:recover");
+    ImGui::SameLine();
+    if (ImGui::Button("Discard")) answered();
+    mark(editor, "recovery:discard");
+    ImGui::SameLine();
+    if (ImGui::Button("Ask again next time")) {
+        editor.recovered.clear();
+        ImGui::CloseCurrentPopup();
+    }
+    mark(editor, "recovery:later");
+    ImGui::EndPopup();
+}
+
 void draw_problems(Editor& editor) {
     if (!editor.show_problems) return;
     const ImVec2 screen = ImGui::GetIO().DisplaySize;
@@ -256,6 +293,7 @@ void open_file_dialog(Editor& editor, FileDialog::Purpose purpose, const fs::pat
 }
 
 void draw_dialogs(Editor& editor) {
+    draw_recovery_question(editor);
     draw_changes_question(editor);
     draw_file_dialog(editor);
     draw_problems(editor);
@@ -278,6 +316,9 @@ void draw_help(Editor& editor) {
         {"Drag from a wired input", "Takes the wire off; with Shift, begins another one."},
         {"Wheel; right or middle button", "Zooms to the pointer; moves the canvas."},
         {"Double click, right click", "Adds a node; on a node, shows its picture."},
+        {"Drag the picture", "Turns its camera; with Shift or the middle button, moves it."},
+        {"Wheel on the picture", "Zooms the camera; with Ctrl, magnifies the picture."},
+        {"Pictures' list, upper right", "Compares: two, four, wiped, in turns, their difference."},
         {"Drop a node on a wire", "Puts it into the wire."},
         {"Alt+click a wire", "Removes it."},
         {"Ctrl+click a slider", "Types a number."},

@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
     : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
-      examples(find_examples()), evaluator(nodes, std::move(wake)) {}
+      examples(find_examples()),
+      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), evaluator(nodes, wake) {}
 
 // --- small things that all regions use -----------------------------------------------------------
 
@@ -53,18 +54,18 @@ const NodeStatus* status_of(const Editor& editor, const std::string& node) {
 
 // --- documents -----------------------------------------------------------------------------------
 
-namespace {
-
 void begin_document(Editor& editor, Workspace work) {
     close_drag_step(editor);
     editor.work = std::move(work);
     editor.texts.clear();
     editor.id_of.clear();
-    editor.viewport.port = {};
+    for (Picture& picture : editor.viewport.pictures) picture.port = {};
     editor.viewport.zoom = 0;
     editor.start_page = false;
     fit_canvas(editor);
 }
+
+namespace {
 
 void save_to(Editor& editor, const fs::path& file) {
     close_drag_step(editor);
@@ -114,21 +115,58 @@ void unless_changed(Editor& editor, std::function<void()> f) {
 
 // --- evaluation ----------------------------------------------------------------------------------
 
-WireEnd shown_port(const Editor& editor) {
-    auto is_image = [&](const WireEnd& end) {
-        const GraphNode* node = editor.work.graph().find(end.node);
-        const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
-        const PortSpec* port = type ? type->find_output(end.port) : nullptr;
-        return port && type_of(*port) == PortType::image;
-    };
-    if (is_image(editor.viewport.port)) return editor.viewport.port;
-    for (const WireEnd& end : editor.work.graph().outputs)
-        if (is_image(end)) return end;
-    for (const GraphNode& node : editor.work.graph().nodes)
+namespace {
+
+bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
+
+bool contains(const std::vector<WireEnd>& ports, const WireEnd& port) {
+    return std::any_of(ports.begin(), ports.end(), [&](const WireEnd& p) { return same_end(p, port); });
+}
+
+}  // namespace
+
+std::vector<WireEnd> ports_to_look_at(const Editor& editor) {
+    std::vector<WireEnd> ports;
+    auto add = [&](const GraphNode& node, std::string_view only, PortType wanted) {
         if (const NodeType* type = editor.registry.find(node.type))
             for (const PortSpec& port : type->outputs)
-                if (type_of(port) == PortType::image) return {node.id, port.key, {}};
-    return {};
+                if (type_of(port) == wanted && (only.empty() || port.key == only))
+                    if (const WireEnd end{node.id, port.key, {}}; !contains(ports, end)) ports.push_back(end);
+    };
+    for (PortType wanted : {PortType::image, PortType::table}) {
+        for (const WireEnd& end : editor.work.graph().outputs)
+            if (const GraphNode* node = editor.work.graph().find(end.node)) add(*node, end.port, wanted);
+        for (const GraphNode& node : editor.work.graph().nodes) add(node, {}, wanted);
+    }
+    return ports;
+}
+
+std::vector<WireEnd> shown_ports(const Editor& editor) {
+    const std::vector<WireEnd> all = ports_to_look_at(editor);
+    const Viewport::Mode mode = editor.viewport.mode;
+    const std::size_t count = mode == Viewport::Mode::single ? 1 : mode == Viewport::Mode::four ? 4 : 2;
+    std::vector<WireEnd> shown;
+    for (std::size_t k = 0; k < count; ++k) {
+        if (const WireEnd& chosen = editor.viewport.pictures[k].port; contains(all, chosen)) {
+            shown.push_back(chosen);
+            continue;
+        }
+        auto next = std::find_if(all.begin(), all.end(), [&](const WireEnd& end) { return !contains(shown, end); });
+        if (next != all.end()) shown.push_back(*next);
+    }
+    return shown;
+}
+
+glm::ivec2 whole_size(const Editor& editor, const WireEnd& port, glm::ivec2 otherwise) {
+    const GraphNode* node = editor.work.graph().find(port.node);
+    const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
+    const PortSpec* spec = type ? type->find_output(port.port) : nullptr;
+    const NodeStatus* status = status_of(editor, port.node);
+    if (!spec || !status) return otherwise;
+    const auto o = std::size_t(spec - type->outputs.data());
+    if (o >= status->outputs.size()) return otherwise;
+    const auto* image = std::get_if<ImageDesc>(&status->outputs[o].detail);
+    return image && image->size.x > 0 && image->size.y > 0 ? image->size : otherwise;
 }
 
 namespace {
@@ -154,18 +192,12 @@ void submit(Editor& editor, bool coarse, bool write) {
     editor.evaluator.submit(std::move(request));
 }
 
-bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
-
 }  // namespace
 
 void submit_changes(Editor& editor) {
-    const WireEnd shown = shown_port(editor);
-    const bool others = editor.watched.size() != (shown.node.empty() ? 0u : 1u) ||
-                        (!editor.watched.empty() && !same_end(editor.watched[0], shown));
-    if (others) {
-        editor.watched.clear();
-        if (!shown.node.empty()) editor.watched.push_back(shown);
-    }
+    std::vector<WireEnd> shown = shown_ports(editor);
+    const bool others = !std::equal(shown.begin(), shown.end(), editor.watched.begin(), editor.watched.end(), same_end);
+    if (others) editor.watched = std::move(shown);
     const bool changed = !editor.ever_submitted || others || !same_results(editor.submitted, editor.work.graph());
     if (changed || (editor.submitted_coarse && !editor.moving)) submit(editor, editor.moving, false);
 }
@@ -255,6 +287,8 @@ void draw(Editor& editor) {
     draw_message(editor);
     // What is done where the button is let go still belongs to the drag.
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) close_drag_step(editor);
+    editor.autosave.update(editor.work, ImGui::GetTime());
+    editor.moving = editor.moving || ImGui::GetTime() < editor.moving_until;
     submit_changes(editor);
 }
 

@@ -5,14 +5,17 @@
 // its end. Everything here belongs to the thread that owns the window.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "app/editor/model/autosave.h"
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
+#include "app/editor/model/histogram.h"
 #include "app/editor/model/settings.h"
 #include "app/editor/view/theme.h"
 
@@ -50,13 +53,28 @@ struct AddMenu {
     bool end_is_output = true;
 };
 
-struct Viewport {
-    WireEnd port;             // an image; empty: the first one that there is
-    double zoom = 0;          // screen pixels a picture pixel; 0: fitted
-    glm::dvec2 offset{0.0};   // of the picture's middle from the viewport's, in screen pixels
+struct Picture {
+    WireEnd port;              // an image or a table; empty: the next one that there is
     unsigned texture = 0;
     std::uint64_t serial = 0;  // of the value in the texture
     glm::ivec2 size{0};
+};
+
+struct Difference {
+    Picture picture;
+    double scale = 8, made_with = 0;
+    std::pair<std::uint64_t, std::uint64_t> serials;  // of the two pictures
+};
+
+// Pictures, alone or compared; all are moved and magnified together.
+struct Viewport {
+    enum class Mode { single, two, four, wipe, flicker, difference };
+    Mode mode = Mode::single;
+    std::array<Picture, 4> pictures;
+    Difference difference;
+    double wipe = 0.5;         // share of the width that shows the first picture
+    double zoom = 0;           // screen pixels a picture pixel; 0: fitted
+    glm::dvec2 offset{0.0};    // of the picture's middle from the viewport's, in screen pixels
 };
 
 struct FileDialog {
@@ -67,6 +85,12 @@ struct FileDialog {
     std::string name;
     std::vector<std::filesystem::path> entries;  // of the folder; folders first
     std::function<void(const std::filesystem::path&)> chosen;
+};
+
+// The point of a transfer function that is in the hand, and the one that was last.
+struct TransferEditor {
+    std::string node;
+    int dragged = -1, chosen = -1;
 };
 
 // A thing on the screen with a name, for tests and other programs that look for it.
@@ -83,11 +107,16 @@ struct Editor {
     Settings settings;
     std::vector<Example> examples;
 
+    Autosave autosave{autosave_folder()};
+    std::vector<Recovered> recovered;  // of sessions that ended unexpectedly; asked for one by one
+    bool ask_about_recovery = false;
+
     Workspace work;
     std::optional<Document::Step> drag_step;  // all edits of one drag are one step of undo
     Canvas canvas;
     AddMenu add;
     Viewport viewport;
+    TransferEditor transfer;
     FileDialog files;
     bool start_page = true, show_help = false, show_problems = false, show_expert = false;
     std::function<void()> after_saving_asked;  // waits for the answer about unsaved changes
@@ -106,10 +135,16 @@ struct Editor {
     Graph submitted;            // as the evaluator has it
     std::vector<WireEnd> watched;
     bool submitted_coarse = false, ever_submitted = false, moving = false;
+    double moving_until = 0;    // a wheel that turns has no button to let go
     std::filesystem::path output_folder = "out";
+
+    std::map<std::string, Picture> thumbnails;  // by port
+    std::vector<double> frame_seconds;          // of the newest frames, a ring
+    std::size_t frames_drawn = 0;
 
     std::vector<Mark> marks;
     Evaluator::State live;
+    HistogramMaker histograms;
     Evaluator evaluator;        // the last: it ends first
 };
 
@@ -122,10 +157,15 @@ void mark(Editor& editor, std::string name);  // the last item of ImGui
 void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi);
 
 const NodeStatus* status_of(const Editor& editor, const std::string& node);
-// The image port that the viewport shows, or an empty end.
-WireEnd shown_port(const Editor& editor);
+// Images and tables, those that the graph is run for first.
+std::vector<WireEnd> ports_to_look_at(const Editor& editor);
+// What the viewport shows; fewer where there are not as many.
+std::vector<WireEnd> shown_ports(const Editor& editor);
+// The size of a port's image when nothing moves.
+glm::ivec2 whole_size(const Editor& editor, const WireEnd& port, glm::ivec2 otherwise);
 
 void close_drag_step(Editor& editor);
+void begin_document(Editor& editor, Workspace work);
 void new_graph(Editor& editor);
 void open_graph(Editor& editor, const std::filesystem::path& file);
 void save(Editor& editor);
@@ -145,6 +185,8 @@ void draw_canvas(Editor& editor);
 void draw_add_menu(Editor& editor);
 void draw_viewport(Editor& editor);
 void draw_parameters(Editor& editor);
+bool has_transfer_editor(const NodeType& type);
+void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType& type);
 void draw_status_bar(Editor& editor);
 void draw_start_page(Editor& editor);
 void draw_dialogs(Editor& editor);

@@ -306,6 +306,15 @@ void draw_state(Editor& editor, const std::string& id) {
     const Theme& t = theme();
     if (!status->message.empty()) wrapped_in(status->state == NodeState::failed ? t.bad : t.warn, status->message);
     for (const std::string& warning : status->warnings) wrapped_in(t.warn, warning);
+}
+
+void draw_measurements(Editor& editor, const std::string& id) {
+    const NodeStatus* status = status_of(editor, id);
+    if (!status || status->measurements.empty()) return;
+    const Theme& t = theme();
+    ImGui::Dummy({0, ui(2)});
+    text_in(t.accent, "Measured");
+    ImGui::Separator();
     for (const auto& [name, m] : status->measurements) {
         std::string title = name;
         std::replace(title.begin(), title.end(), '_', ' ');
@@ -375,8 +384,10 @@ void draw_parameters(Editor& editor) {
     draw_state(editor, id);
     ImGui::Dummy({0, ui(2)});
     if (type) {
+        if (has_transfer_editor(*type)) draw_transfer_editor(editor, id, *type);
         draw_groups(editor, id, *type);
         if (editor.work.graph().find(id)) draw_outputs(editor, id, *type);
+        draw_measurements(editor, id);
     } else {
         for (const GraphParam& param : node->params) {
             text_in(theme().muted, param.key.c_str());

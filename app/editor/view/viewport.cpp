@@ -1,81 +1,138 @@
-// The picture of an image port: fitted, or moved and magnified by the mouse.
-#include <GL/gl.h>
+// Pictures and tables: one of them, several side by side, or two of them over each other.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
+#include "app/editor/model/camera_control.h"
 #include "app/editor/view/actions.h"
-#include "app/editor/view/editor.h"
+#include "app/editor/view/picture.h"
 #include "core/base/text.h"
 
 namespace voxloom::editor {
 
 namespace {
 
-#ifndef GL_CLAMP_TO_EDGE
-#define GL_CLAMP_TO_EDGE 0x812F
-#endif
+using Mode = Viewport::Mode;
 
-std::vector<WireEnd> image_ports(const Editor& editor) {
-    std::vector<WireEnd> ports;
-    for (const GraphNode& node : editor.work.graph().nodes)
-        if (const NodeType* type = editor.registry.find(node.type))
-            for (const PortSpec& port : type->outputs)
-                if (type_of(port) == PortType::image) ports.push_back({node.id, port.key, {}});
-    return ports;
+std::string name_of_port(const WireEnd& port) { return port.node + "." + port.port; }
+
+const LiveValue* value_at(const Editor& editor, const WireEnd& port) {
+    auto found = editor.live.values.find(name_of_port(port));
+    return found == editor.live.values.end() ? nullptr : &found->second;
 }
 
-// Opaque, over black where the picture is transparent. Not a number is black.
-std::vector<glm::u8vec4> pixels_of(const Image& image) {
-    std::vector<glm::u8vec4> pixels(std::size_t(image.size().x) * std::size_t(image.size().y));
-    if (image.format() == Image::Format::rgba8) {
-        std::ranges::copy(image.rgba8(), pixels.begin());
-        for (glm::u8vec4& p : pixels) p.a = 255;
-        return pixels;
-    }
-    auto byte = [](float v) { return std::uint8_t(v > 0 ? std::min(v, 1.f) * 255 + 0.5f : 0.f); };
-    std::ranges::transform(image.rgba32f(), pixels.begin(), [&](const glm::vec4& p) {
-        return glm::u8vec4(byte(p.r), byte(p.g), byte(p.b), 255);
-    });
-    return pixels;
+const Camera* camera_seen(const Editor& editor, const std::optional<std::string>& camera) {
+    if (!camera) return nullptr;
+    for (const auto& [port, value] : editor.live.values)
+        if (auto* now = std::get_if<CameraPtr>(&value.value); now && port.starts_with(*camera + ".")) return now->get();
+    return nullptr;
 }
 
-void upload(Viewport& view, const Image& image) {
-    if (!view.texture) glGenTextures(1, &view.texture);
-    const std::vector<glm::u8vec4> pixels = pixels_of(image);
-    GLint before = 0;
-    glGetIntegerv(GL_TEXTURE_BINDING_2D, &before);
-    glBindTexture(GL_TEXTURE_2D, view.texture);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, image.size().x, image.size().y, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
-    glBindTexture(GL_TEXTURE_2D, GLuint(before));
-    view.size = image.size();
-}
+// --- what stands above the pictures ---------------------------------------------------------------
 
-void draw_port_choice(Editor& editor, const WireEnd& shown) {
-    const std::string name = shown.node + "." + shown.port;
-    ImGui::SetNextItemWidth(std::min(ui(220), ImGui::GetContentRegionAvail().x * 0.6f));
+void draw_port_choice(Editor& editor, std::size_t k, const WireEnd& shown, float width) {
+    const std::string name = name_of_port(shown);
+    ImGui::PushID(int(k));
+    ImGui::SetNextItemWidth(width);
     if (ImGui::BeginCombo("##port", name.c_str())) {
-        for (const WireEnd& port : image_ports(editor)) {
-            const std::string text = port.node + "." + port.port;
-            if (ImGui::Selectable(text.c_str(), text == name)) editor.viewport.port = port, editor.viewport.zoom = 0;
+        for (const WireEnd& port : ports_to_look_at(editor)) {
+            const std::string text = name_of_port(port);
+            if (ImGui::Selectable(text.c_str(), text == name)) editor.viewport.pictures[k].port = port;
             mark(editor, "show:" + text);
         }
         ImGui::EndCombo();
     }
-    mark(editor, "picture-port");
-    tooltip("The picture that is shown; a double click on a node shows its picture, too.");
-    ImGui::SameLine();
-    action_button(editor, "fit-picture");
+    mark(editor, fmt::format("picture-port:{}", k));
+    tooltip("What is shown; a double click on a node shows its picture, too.");
+    ImGui::PopID();
 }
 
-// What is said in the picture's corner: its size, its age, how fast it came.
-std::string caption(const Editor& editor, const WireEnd& port, const LiveValue& value) {
-    std::string text = fmt::format("{} x {}", editor.viewport.size.x, editor.viewport.size.y);
+void draw_mode_choice(Editor& editor) {
+    Viewport& view = editor.viewport;
+    static const std::pair<Mode, const char*> modes[] = {{Mode::single, "One"}, {Mode::two, "Two"}, {Mode::four, "Four"},
+                                                         {Mode::wipe, "Wipe"}, {Mode::flicker, "Flicker"}, {Mode::difference, "Difference"}};
+    const char* now = "";
+    for (auto& [mode, name] : modes)
+        if (mode == view.mode) now = name;
+    ImGui::SetNextItemWidth(ui(104));
+    if (ImGui::BeginCombo("##mode", now)) {
+        for (auto& [mode, name] : modes) {
+            if (ImGui::Selectable(name, mode == view.mode)) view.mode = mode;
+            mark(editor, std::string("mode:") + name);
+        }
+        ImGui::EndCombo();
+    }
+    mark(editor, "mode");
+    tooltip("One picture, or several to compare: side by side, one wiped over the other, in turns, or their difference.  (C)");
+    if (view.mode != Mode::difference) return;
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(ui(90));
+    float scale = float(view.difference.scale);
+    if (ImGui::SliderFloat("##scale", &scale, 1, 256, "x %.0f", ImGuiSliderFlags_Logarithmic)) view.difference.scale = double(scale);
+    tooltip("Differences are drawn this many times as large.");
+}
+
+// --- the mouse -----------------------------------------------------------------------------------
+
+// The picture itself under the glass.
+void move_picture(Viewport& view, glm::dvec2 middle, double scale, double wheel, bool dragged) {
+    const ImGuiIO& io = ImGui::GetIO();
+    if (wheel != 0) {
+        const double zoom = std::clamp(scale * std::pow(1.15, wheel), 0.02, 64.0);
+        view.offset += (vec(io.MousePos) - middle - view.offset) * (1 - zoom / scale);
+        view.zoom = zoom;
+    }
+    if (!dragged) return;
+    if (view.zoom == 0) view.zoom = scale;
+    view.offset += vec(io.MouseDelta);
+}
+
+// The cameras of all the pictures, so that they keep showing the same.
+void move_cameras(Editor& editor, const std::set<std::string>& cameras, double picture_height, double wheel, bool orbiting, bool panning) {
+    const glm::dvec2 delta = vec(ImGui::GetIO().MouseDelta) / std::max(picture_height, 1.0);
+    if (wheel != 0) editor.moving_until = ImGui::GetTime() + 0.25;
+    if (orbiting || panning) editor.moving = true;
+    if (wheel == 0 && delta == glm::dvec2(0.0)) return;
+    edit(editor, [&] {
+        Document::Step step(editor.work.document);
+        for (const std::string& camera : cameras) {
+            if (wheel != 0) magnify(editor.work, editor.registry, camera, std::pow(1.15, wheel));
+            // Half a turn across the picture's height, whatever its size on the screen.
+            if (orbiting) orbit(editor.work, editor.registry, camera, delta * 180.0);
+            if (const Camera* now = camera_seen(editor, camera); panning && now) pan(editor.work, editor.registry, camera, delta, *now);
+        }
+    });
+}
+
+void handle_mouse(Editor& editor, glm::dvec2 middle, double scale, double picture_height) {
+    const ImGuiIO& io = ImGui::GetIO();
+    const double wheel = ImGui::IsItemHovered() ? double(io.MouseWheel) : 0;
+    const bool held = ImGui::IsItemActive();
+    if (!held && wheel == 0) return;
+    std::set<std::string> cameras;
+    for (const WireEnd& port : shown_ports(editor))
+        if (auto camera = camera_of(editor.work.graph(), editor.registry, port.node)) cameras.insert(*camera);
+    if (cameras.empty()) return move_picture(editor.viewport, middle, scale, wheel, held);
+    const bool left = held && ImGui::IsMouseDown(ImGuiMouseButton_Left);
+    const bool middle_button = held && ImGui::IsMouseDown(ImGuiMouseButton_Middle);
+    const bool right = held && ImGui::IsMouseDown(ImGuiMouseButton_Right);
+    move_cameras(editor, cameras, picture_height * scale, io.KeyCtrl ? 0 : wheel, left && !io.KeyShift, middle_button || (left && io.KeyShift));
+    move_picture(editor.viewport, middle, scale, io.KeyCtrl ? wheel : 0, right);
+}
+
+// --- one cell ------------------------------------------------------------------------------------
+
+void say_in(glm::dvec2 lo, glm::dvec2 size, const std::string& text) {
+    const ImVec2 extent = ImGui::CalcTextSize(text.c_str(), nullptr, false, float(size.x) - ui(24));
+    ImGui::GetWindowDrawList()->AddText(theme().body, theme().body->FontSize, im(lo + (size - vec(extent)) * 0.5),
+                                        IM_COL32(148, 155, 167, 255), text.c_str(), nullptr, float(size.x) - ui(24));
+}
+
+// What is said in the corner: the picture's size, its age, how fast it came.
+std::string caption(const Editor& editor, const WireEnd& port, const LiveValue& value, glm::ivec2 size) {
+    std::string text = fmt::format("{} x {}", size.x, size.y);
     if (const NodeStatus* status = status_of(editor, port.node)) {
         if (status->state == NodeState::failed) return text + ", not of this graph: the node failed";
         if (value.fresh && status->wall_seconds > 0) text += ", " + human_seconds(status->wall_seconds);
@@ -84,70 +141,173 @@ std::string caption(const Editor& editor, const WireEnd& port, const LiveValue& 
     return text;
 }
 
-void handle_mouse(Viewport& view, glm::dvec2 middle, double scale) {
-    const ImGuiIO& io = ImGui::GetIO();
-    if (ImGui::IsItemHovered() && io.MouseWheel != 0) {
-        const double zoom = std::clamp(scale * std::pow(1.15, double(io.MouseWheel)), 0.02, 64.0);
-        const glm::dvec2 from_middle = vec(io.MousePos) - middle - view.offset;
-        view.offset += from_middle * (1 - zoom / scale);
-        view.zoom = zoom;
+void draw_caption(glm::dvec2 lo, glm::dvec2 size, const std::string& text, bool fresh) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const std::string cut = shortened(text, float(size.x) - ui(32), theme().body, theme().body->FontSize);
+    const ImVec2 extent = ImGui::CalcTextSize(cut.c_str());
+    const ImVec2 at = im(lo + glm::dvec2(ui(12), size.y - extent.y - ui(10)));
+    list.AddRectFilled({at.x - ui(6), at.y - ui(3)}, {at.x + extent.x + ui(6), at.y + extent.y + ui(3)}, IM_COL32(0, 0, 0, 150), ui(4));
+    list.AddText(at, fresh ? IM_COL32(205, 210, 218, 255) : theme().warn, cut.c_str());
+}
+
+std::string text_of(const Table::Cell& cell) {
+    if (auto* i = std::get_if<std::int64_t>(&cell)) return std::to_string(*i);
+    if (auto* d = std::get_if<double>(&cell)) return fmt::format("{:.5g}", *d);
+    return std::get<std::string>(cell);
+}
+
+void draw_table(const Table& table, glm::dvec2 lo, glm::dvec2 size) {
+    ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(42))));
+    const ImVec2 room{float(size.x) - ui(16), float(size.y) - ui(50)};
+    const auto columns = int(std::min<std::size_t>(table.columns.size(), 64));
+    if (columns == 0) return say_in(lo, size, "The table has no columns.");
+    if (!ImGui::BeginTable("table", columns, ImGuiTableFlags_ScrollX | ImGuiTableFlags_ScrollY | ImGuiTableFlags_RowBg | ImGuiTableFlags_BordersInnerV |
+                                                 ImGuiTableFlags_SizingFixedFit, room)) return;
+    ImGui::TableSetupScrollFreeze(0, 1);
+    for (int c = 0; c < columns; ++c) {
+        const Table::Column& column = table.columns[std::size_t(c)];
+        ImGui::TableSetupColumn((column.name + (column.unit.empty() ? "" : ", " + column.unit)).c_str());
     }
-    if (ImGui::IsItemActive()) {
-        if (view.zoom == 0) view.zoom = scale;
-        view.offset += vec(io.MouseDelta);
+    ImGui::TableHeadersRow();
+    ImGuiListClipper clipper;
+    clipper.Begin(int(table.rows.size()));
+    while (clipper.Step())
+        for (int r = clipper.DisplayStart; r < clipper.DisplayEnd; ++r) {
+            ImGui::TableNextRow();
+            for (int c = 0; c < columns; ++c) {
+                ImGui::TableSetColumnIndex(c);
+                ImGui::TextUnformatted(text_of(table.rows[std::size_t(r)][std::size_t(c)]).c_str());
+            }
+        }
+    ImGui::EndTable();
+}
+
+std::string why_empty(const Editor& editor, const WireEnd& port) {
+    const NodeStatus* status = status_of(editor, port.node);
+    if (status && (status->state == NodeState::failed || status->state == NodeState::not_run)) return status->message;
+    return editor.live.busy ? "Computing…" : "Nothing here yet.";
+}
+
+// A rectangle of the window with the pictures `shown` in it: one, or two over each other.
+struct Cell {
+    glm::dvec2 lo, size;
+    std::vector<std::size_t> shown;
+};
+
+void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& ports) {
+    Viewport& view = editor.viewport;
+    const WireEnd& port = ports[cell.shown.front()];
+    const LiveValue* value = value_at(editor, port);
+    if (cell.shown.size() == 1 && value && std::holds_alternative<TablePtr>(value->value))
+        return draw_table(*std::get<TablePtr>(value->value), cell.lo, cell.size);
+
+    ImGui::PushID(int(cell.shown.front()));
+    ImGui::SetCursorScreenPos(im(cell.lo + glm::dvec2(0, ui(40))));
+    ImGui::InvisibleButton("picture", {std::max(float(cell.size.x), 1.f), std::max(float(cell.size.y) - ui(40), 1.f)},
+                           ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonMiddle | ImGuiButtonFlags_MouseButtonRight);
+    ImGui::PopID();
+    const bool hovered = ImGui::IsItemHovered();
+
+    const std::size_t a = cell.shown.front(), b = cell.shown.back();
+    const LiveValue* other = value_at(editor, ports[b]);
+    std::string why;
+    Picture* picture = &view.pictures[a];
+    bool there = update_picture(*picture, value);
+    const bool other_there = b != a && update_picture(view.pictures[b], other);
+    if (view.mode == Mode::difference) {
+        there = update_difference(view, value, other, why);
+        picture = &view.difference.picture;
+    } else if (view.mode == Mode::flicker && other_there && std::fmod(ImGui::GetTime(), 1.0) > 0.5) {
+        picture = &view.pictures[b];
     }
+    if (!there) return say_in(cell.lo, cell.size, why.empty() ? why_empty(editor, port) : why);
+
+    // Sizes are those that the picture has when it is whole, so that a coarse one takes the same place.
+    const glm::dvec2 whole = glm::max(glm::dvec2(whole_size(editor, port, picture->size)), glm::dvec2(1));
+    const double fitted = std::min(cell.size.x / whole.x, cell.size.y / whole.y);
+    const glm::dvec2 middle = cell.lo + cell.size * 0.5;
+    handle_mouse(editor, middle, view.zoom > 0 ? view.zoom : fitted, whole.y);
+    const double scale = view.zoom > 0 ? view.zoom : fitted;
+    const glm::dvec2 half = whole * scale * 0.5, lo = middle + view.offset - half, hi = middle + view.offset + half;
+    auto texture = [](const Picture& p) { return reinterpret_cast<ImTextureID>(std::uintptr_t(p.texture)); };
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    list.PushClipRect(im(cell.lo), im(cell.lo + cell.size), true);
+    list.AddImage(texture(*picture), im(lo), im(hi));
+    if (view.mode == Mode::wipe && other_there) {
+        if (hovered && !ImGui::IsItemActive()) view.wipe = std::clamp((double(ImGui::GetMousePos().x) - lo.x) / (hi.x - lo.x), 0.0, 1.0);
+        const double x = lo.x + view.wipe * (hi.x - lo.x);
+        list.AddImage(texture(view.pictures[b]), im({x, lo.y}), im(hi), {float(view.wipe), 0}, {1, 1});
+        list.AddLine(im({x, lo.y}), im({x, hi.y}), theme().accent, std::max(ui(1), 1.f));
+    }
+    std::string text = view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
+                                                     : caption(editor, port, *value, picture->size);
+    if (hovered && view.mode != Mode::difference) {
+        const Image& image = *std::get<ImagePtr>(value->value);
+        const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image.size());
+        const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, port.node));
+        if (std::string pixel = pixel_text(image, at, camera); !pixel.empty()) text += "   " + pixel;
+    }
+    draw_caption(cell.lo, cell.size, text, value->fresh);
+    list.PopClipRect();
+}
+
+std::vector<Cell> cells_of(const Viewport& view, glm::dvec2 lo, glm::dvec2 size, std::size_t ports) {
+    const double gap = ui(3);
+    auto cell = [&](std::size_t k, std::size_t columns, std::size_t rows) {
+        const glm::dvec2 each = (size - gap * glm::dvec2(double(columns - 1), double(rows - 1))) / glm::dvec2(double(columns), double(rows));
+        return Cell{lo + (each + gap) * glm::dvec2(double(k % columns), double(k / columns)), each, {k}};
+    };
+    std::vector<Cell> cells;
+    switch (view.mode) {
+        case Mode::single: cells.push_back(cell(0, 1, 1)); break;
+        case Mode::two:
+            for (std::size_t k = 0; k < std::min<std::size_t>(ports, 2); ++k) cells.push_back(cell(k, 2, 1));
+            break;
+        case Mode::four:
+            for (std::size_t k = 0; k < std::min<std::size_t>(ports, 4); ++k) cells.push_back(cell(k, 2, 2));
+            break;
+        case Mode::wipe:
+        case Mode::flicker:
+        case Mode::difference:
+            cells.push_back(cell(0, 1, 1));
+            if (ports > 1) cells[0].shown.push_back(1);
+            break;
+    }
+    return cells;
 }
 
 }  // namespace
 
 void draw_viewport(Editor& editor) {
-    Viewport& view = editor.viewport;
-    const Theme& t = theme();
     const glm::dvec2 lo = vec(ImGui::GetCursorScreenPos()), size = vec(ImGui::GetContentRegionAvail());
-    ImDrawList& list = *ImGui::GetWindowDrawList();
-    list.AddRectFilled(im(lo), im(lo + size), IM_COL32(0, 0, 0, 255));
+    ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().dark ? IM_COL32(8, 9, 11, 255) : IM_COL32(40, 43, 48, 255));
     mark(editor, "picture", im(lo), im(lo + size));
-    const WireEnd port = shown_port(editor);
-    auto say_instead = [&](const char* text) {
-        const ImVec2 extent = ImGui::CalcTextSize(text);
-        list.AddText(im(lo + (size - vec(extent)) * 0.5), IM_COL32(148, 155, 167, 255), text);
-    };
-    if (port.node.empty()) return say_instead("A node that makes an image shows it here.");
-
-    ImGui::SetCursorScreenPos(im(lo + glm::dvec2(0, ui(40))));
-    ImGui::InvisibleButton("picture", {std::max(float(size.x), 1.f), std::max(float(size.y) - ui(40), 1.f)});
-    auto found = editor.live.values.find(port.node + "." + port.port);
-    const ImagePtr* image = found == editor.live.values.end() ? nullptr : std::get_if<ImagePtr>(&found->second.value);
-    if (image) {
-        if (found->second.serial != view.serial) {
-            // A coarse picture takes the place of the whole one, so that nothing jumps.
-            const glm::ivec2 before = view.size;
-            upload(view, **image);
-            if (view.zoom > 0 && before.x > 0 && view.size.x > 0) view.zoom *= double(before.x) / view.size.x;
-            view.serial = found->second.serial;
-        }
-        const glm::dvec2 picture = glm::max(glm::dvec2(view.size), glm::dvec2(1));
-        const double fitted = std::min(size.x / picture.x, size.y / picture.y);
-        const glm::dvec2 middle = lo + size * 0.5;
-        handle_mouse(view, middle, view.zoom > 0 ? view.zoom : fitted);
-        const double scale = view.zoom > 0 ? view.zoom : fitted;
-        const glm::dvec2 half = picture * scale * 0.5;
-        list.PushClipRect(im(lo), im(lo + size), true);
-        list.AddImage(reinterpret_cast<ImTextureID>(std::uintptr_t(view.texture)), im(middle + view.offset - half), im(middle + view.offset + half));
-        const std::string text = caption(editor, port, found->second);
-        const ImVec2 extent = ImGui::CalcTextSize(text.c_str());
-        const ImVec2 at = im(lo + glm::dvec2(ui(12), size.y - extent.y - ui(10)));
-        list.AddRectFilled({at.x - ui(6), at.y - ui(3)}, {at.x + extent.x + ui(6), at.y + extent.y + ui(3)}, IM_COL32(0, 0, 0, 150), ui(4));
-        list.AddText(at, found->second.fresh ? IM_COL32(205, 210, 218, 255) : t.warn, text.c_str());
-        list.PopClipRect();
-    } else {
-        const NodeStatus* status = status_of(editor, port.node);
-        say_instead(status && status->state == NodeState::failed ? "The node failed; its sentence stands below."
-                    : editor.live.busy                             ? "Computing…"
-                                                                   : "No picture yet.");
+    const std::vector<WireEnd> ports = shown_ports(editor);
+    if (ports.empty()) return say_in(lo, size, "A node that makes an image shows it here.");
+    const std::vector<Cell> cells = cells_of(editor.viewport, lo, size, ports.size());
+    for (const Cell& cell : cells) {
+        ImGui::GetWindowDrawList()->AddRectFilled(im(cell.lo), im(cell.lo + cell.size), IM_COL32(0, 0, 0, 255));
+        draw_cell(editor, cell, ports);
+        mark(editor, fmt::format("picture:{}", cell.shown.front()), im(cell.lo), im(cell.lo + cell.size));
     }
-    ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(7))));
-    draw_port_choice(editor, port);
+    for (const Cell& cell : cells) {
+        const bool first = cell.shown.front() == 0;
+        // Beside the lists stand the mode, its slider, and a button.
+        const Mode mode = editor.viewport.mode;
+        const bool narrow = mode == Mode::two || mode == Mode::four;
+        const double taken = !first ? ui(8) : narrow ? ui(120) : mode == Mode::difference ? ui(310) : ui(210);
+        const float width = std::min(ui(200), float(cell.size.x - taken) / float(cell.shown.size()) - ui(10));
+        ImGui::SetCursorScreenPos(im(cell.lo + glm::dvec2(ui(8), ui(7))));
+        for (std::size_t k : cell.shown) {
+            draw_port_choice(editor, k, ports[k], std::max(width, ui(80)));
+            ImGui::SameLine();
+        }
+        if (!first) continue;
+        draw_mode_choice(editor);
+        if (narrow) continue;
+        ImGui::SameLine();
+        action_button(editor, "fit-picture");
+    }
 }
 
 }  // namespace voxloom::editor

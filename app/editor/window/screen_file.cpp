@@ -3,12 +3,14 @@
 #include <GL/gl.h>
 #include <png.h>
 
+#include <algorithm>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/base/output_file.h"
+#include "core/measure/statistics.h"
 
 namespace voxloom::editor {
 
@@ -18,6 +20,14 @@ std::string screen_to_json(const Editor& editor) {
     json["file"] = editor.work.file.string();
     json["changed"] = editor.work.changed();
     json["busy"] = editor.live.busy || editor.moving || editor.submitted_coarse;
+    std::vector<double> frames = editor.frame_seconds;
+    std::ranges::sort(frames);
+    if (!frames.empty()) {
+        json["frame_seconds"]["median"] = quantile(frames, 0.5);
+        json["frame_seconds"]["p99"] = quantile(frames, 0.99);
+    }
+    json["first_picture_seconds"] = editor.live.first_picture_seconds;
+    json["run_seconds"] = editor.live.wall_seconds;
     json["message"] = editor.message;
     json["selected"] = editor.work.selected;
     json["text"] = editor.work.document.text();

@@ -11,7 +11,7 @@
 #include <ctime>
 #include <memory>
 
-#include "app/editor/view/editor.h"
+#include "app/editor/view/picture.h"
 #include "app/editor/window/screen_file.h"
 #include "core/base/error.h"
 #include "core/base/output_file.h"
@@ -101,6 +101,17 @@ void write_screen(const Editor& editor, const fs::path& file) {
     out.commit();
 }
 
+void remember_frame(Editor& editor, double seconds) {
+    constexpr std::size_t kMostFrames = 600;
+    if (editor.frame_seconds.size() < kMostFrames) editor.frame_seconds.push_back(0);
+    editor.frame_seconds[editor.frames_drawn++ % kMostFrames] = seconds;
+}
+
+// Something changes by itself: a message goes, pictures take turns, what is not saved waits to be.
+bool is_restless(const Editor& editor) {
+    return !editor.message.empty() || editor.autosave.due() || editor.viewport.mode == Viewport::Mode::flicker;
+}
+
 void draw_frame(Editor& editor, GLFWwindow* window) {
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
@@ -137,11 +148,11 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
     }
 
     for (int frames = kFramesAfterEvent; !editor.quit;) {
-        const bool held = ImGui::IsAnyMouseDown();
+        const bool held = ImGui::IsAnyMouseDown() || editor.moving;
         if (frames > 0 || held)
             glfwPollEvents();
         else
-            glfwWaitEventsTimeout(editor.message.empty() ? 5.0 : 0.25);
+            glfwWaitEventsTimeout(is_restless(editor) ? 0.25 : 5.0);
         frames = frames > 0 ? frames - 1 : kFramesAfterEvent;
         if (glfwWindowShouldClose(window.get())) {
             glfwSetWindowShouldClose(window.get(), GLFW_FALSE);
@@ -150,12 +161,13 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
         const double begun = glfwGetTime();
         if (editor.theme_changed) set_theme(editor, screen_scale);
         draw_frame(editor, window.get());
+        remember_frame(editor, glfwGetTime() - begun);
         if (!arguments.screen.empty()) write_screen(editor, arguments.screen);
         // Software renderers do not wait for the screen.
         if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && spare > 0)
             glfwWaitEventsTimeout(spare);
     }
-    if (editor.viewport.texture) glDeleteTextures(1, &editor.viewport.texture);
+    delete_textures(editor);
     return 0;
 }
 

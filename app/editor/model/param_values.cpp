@@ -1,0 +1,25 @@
+#include "app/editor/model/param_values.h"
+
+#include <cmath>
+
+namespace voxloom::editor {
+
+ParamValue value_of(const GraphNode& node, const ParamSpec& spec) {
+    std::string reason;
+    for (const GraphParam& param : node.params)
+        if (param.key == spec.key)
+            if (auto value = parse_param(spec, param.yaml, reason)) {
+                problem_with(spec, *value);  // a whole number that stands for a real becomes one
+                return *value;
+            }
+    return spec.initial;
+}
+
+double short_number(double v) {
+    if (v == 0 || !std::isfinite(v)) return v;
+    const double unit = std::pow(10, std::floor(std::log10(std::abs(v))) - 5);
+    // Dividing by a whole number where there is one gives the nearest double to the decimal.
+    return unit < 1 ? std::round(v / unit) / std::round(1 / unit) : std::round(v / unit) * unit;
+}
+
+}  // namespace voxloom::editor

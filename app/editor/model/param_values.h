@@ -1,0 +1,14 @@
+// Parameters as the interface reads and writes them.
+#pragma once
+
+#include "core/graph/document.h"
+
+namespace voxloom::editor {
+
+// The value of a parameter as the document has it, or its default.
+ParamValue value_of(const GraphNode& node, const ParamSpec& spec);
+
+// Six significant digits: what a hand can aim at, and what people can read in the file.
+double short_number(double v);
+
+}  // namespace voxloom::editor
