@@ -152,6 +152,8 @@ void EditorProcess::pause() {
 }
 
 void EditorProcess::move_to(const std::string& item, double x, double y) {
+    with(item);
+    pause();  // what has just come up may still move
     const nlohmann::json r = with(item)["items"][item];
     const double left = r[0], top = r[1], right = r[2], bottom = r[3];
     xdotool(fmt::format("mousemove {} {}", int(left + (right - left) * x), int(top + (bottom - top) * y)));

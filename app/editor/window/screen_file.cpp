@@ -31,6 +31,8 @@ std::string screen_to_json(const Editor& editor) {
     json["message"] = editor.message;
     json["selected"] = editor.work.selected;
     json["text"] = editor.work.document.text();
+    json["shown"] = nlohmann::json::array();
+    for (const WireEnd& end : editor.watched) json["shown"].push_back(end.node + "." + end.port);
     json["problems"] = editor.live.problems.size();
     for (const auto& [id, status] : editor.live.nodes) json["states"][id] = name_of(status.state);
     for (const auto& [port, value] : editor.live.values)

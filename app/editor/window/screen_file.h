@@ -10,7 +10,7 @@ namespace voxloom::editor {
 
 // JSON: `items` has name and rectangle [left, top, right, bottom], in window coordinates, of everything
 // that can be clicked or read; further the file, whether it has changes, whether something runs, the
-// message, the selected nodes, the states of all nodes, and how long frames and pictures took.
+// message, the selected nodes, the ports that are looked at, the states of all nodes, and how long frames and pictures took.
 std::string screen_to_json(const Editor& editor);
 
 // The window's pixels as a PNG file. Called when a frame has been drawn. Throws Error.
