@@ -398,13 +398,14 @@ TEST_F(WaveletFile, AFailedWriteLeavesTheOldFile) {
 // write those of the version of today.
 TEST_F(WaveletFile, GoldenFilesOfEachVersionStayReadable) {
     const auto value = [](auto x, auto y, auto z) { return double((x * x + 3 * y + x * z) % 97 + (x > 8 ? 60 : 0)); };
-    for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::fast})
+    for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::blocks, CoderKind::fast})
         for (ScalarType type : {ScalarType::u8, ScalarType::i32, ScalarType::f32}) {
             const VolumePtr volume = make_volume({21, 9, 12}, type, value, {1, 1, 1.6});
-            for (const char* version : {"v1", "v2", "v4"}) {
+            for (const std::string version : {"v1", "v2", "v4"}) {
+                if (coder == CoderKind::fast && version != "v4") continue;  // blocks was in its place
                 const std::filesystem::path golden = std::filesystem::path(VOXLOOM_SOURCE_DIR) / "plugins/codec-wavelet/golden" /
                     fmt::format("{}-{}-{}.vxw", version, name_of(coder), voxloom::name_of(type));
-                if (std::getenv("VOXLOOM_WRITE_GOLDEN") && version == fmt::format("v{}", kFileVersion)) {
+                if (std::getenv("VOXLOOM_WRITE_GOLDEN") && coder != CoderKind::blocks && version == fmt::format("v{}", kFileVersion)) {
                     EncodeOptions options = lossless(coder);
                     options.faces = Faces::shared;
                     write_file(*encoded(*volume, options), golden);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "plugins/codec-wavelet/block_coder.h"
 #include "plugins/codec-wavelet/dense_coder.h"
 #include "plugins/codec-wavelet/fast_coder.h"
 #include "plugins/codec-wavelet/paper_coder.h"
@@ -10,34 +11,19 @@
 namespace voxloom::wavelet {
 
 std::string_view name_of(CoderKind kind) {
-    constexpr std::string_view kNames[] = {"paper", "dense", "fast"};
+    constexpr std::string_view kNames[] = {"paper", "dense", "blocks", "fast"};
     return kNames[int(kind)];
 }
 
 std::unique_ptr<Coder> make_coder(CoderKind kind, std::span<const std::byte> tables) {
     switch (kind) {
         case CoderKind::paper: return make_paper_coder();
+        case CoderKind::blocks: return make_block_coder(tables);
         case CoderKind::fast: return make_fast_coder(tables);
         case CoderKind::dense: break;
     }
     return make_dense_coder(tables);
 }
-
-namespace {
-
-// Calls row(first number, count) for every row of every band of details.
-template <class Row>
-void for_each_row(const Details& d, const Row& row) {
-    for (int mask : kBandOrder) {
-        const Band b = d.shape.band(mask);
-        if (!d.shape.has(b)) continue;
-        for (int z = 0; z < b.dims.z; ++z)
-            for (int y = 0; y < b.dims.y; ++y)
-                row(d.q + d.shape.at(b.lo + glm::ivec3(0, y, z)), std::size_t(b.dims.x));
-    }
-}
-
-}  // namespace
 
 bool all_zero(const Details& details) {
     std::int32_t any = 0;

@@ -13,8 +13,8 @@ namespace voxloom::wavelet {
 
 using Bytes = std::vector<std::byte>;
 
-enum class CoderKind : std::uint8_t { paper = 0, dense = 1, fast = 2 };
-inline constexpr int kCoderKinds = 3;
+enum class CoderKind : std::uint8_t { paper = 0, dense = 1, blocks = 2, fast = 3 };  // blocks is only read
+inline constexpr int kCoderKinds = 4;
 std::string_view name_of(CoderKind kind);
 
 // Immutable once it is trained or read: any thread may encode and decode at any time. What one call

@@ -17,6 +17,7 @@ double error_bound(const EncodeOptions& options, const TreeDesc& tree) {
 std::int64_t families_to_learn_from(CoderKind kind) {
     switch (kind) {
         case CoderKind::paper: return 0;   // its code is fixed
+        case CoderKind::blocks: return 0;  // only read
         case CoderKind::fast: return 96;   // frequencies settle soon
         case CoderKind::dense: break;
     }

@@ -76,4 +76,17 @@ struct Details {
     bool finest = false;  // the children are level 0
 };
 
+// Calls row(first number, count) for every row of a band, and of all bands of details.
+template <class Row>
+void for_each_row(const Details& d, const Band& b, const Row& row) {
+    if (!d.shape.has(b)) return;
+    for (int z = 0; z < b.dims.z; ++z)
+        for (int y = 0; y < b.dims.y; ++y)
+            row(d.q + d.shape.at(b.lo + glm::ivec3(0, y, z)), std::size_t(b.dims.x));
+}
+template <class Row>
+void for_each_row(const Details& d, const Row& row) {
+    for (int mask : kBandOrder) for_each_row(d, d.shape.band(mask), row);
+}
+
 }  // namespace voxloom::wavelet

@@ -1,4 +1,4 @@
-// Static interleaved rANS over blocks: most of the adaptive coder's gain at several times its speed.
+// The coder for the fastest decoding: static rANS, 32 states side by side.
 #pragma once
 
 #include "plugins/codec-wavelet/coder.h"

@@ -182,7 +182,7 @@ TEST(Masks, PlanesOfAnyKindAreCoded) {
 // Version 3 added masks. Set VOXLOOM_WRITE_GOLDEN to write these files.
 TEST(Masks, GoldenFilesStayReadable) {
     const auto volume = masked(ScalarType::u8, [](auto, auto, auto) { return 0; });
-    for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::fast}) {
+    for (CoderKind coder : {CoderKind::paper, CoderKind::dense, CoderKind::blocks}) {
         const std::filesystem::path golden = std::filesystem::path(VOXLOOM_SOURCE_DIR) / "plugins/codec-wavelet/golden" /
             fmt::format("v3-mask-{}-u8.vxw", name_of(coder));
         EncodeReport report;

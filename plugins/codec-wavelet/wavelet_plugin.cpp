@@ -13,12 +13,13 @@ namespace {
 const std::vector<std::string> kTargets = {"lossless", "threshold", "psnr", "max-error", "bpv", "ratio"};
 const std::vector<std::string> kCoders = {"paper", "dense", "fast"};
 const std::vector<std::string> kFaces = {"block", "shared"};
+constexpr CoderKind kCoderOf[] = {CoderKind::paper, CoderKind::dense, CoderKind::fast};
 const std::vector<std::string> kRoundings = {"jpeg2000", "unbiased"};
 
 // Choices stand in the order of the enumerations.
 template <class Enum>
 Enum chosen(const Params& params, std::string_view key, const std::vector<std::string>& choices) {
-    return Enum(std::find(choices.begin(), choices.end(), params.text(key)) - choices.begin());
+    return static_cast<Enum>(std::find(choices.begin(), choices.end(), params.text(key)) - choices.begin());
 }
 
 EncodeOptions options_of(const Params& params) {
@@ -26,7 +27,7 @@ EncodeOptions options_of(const Params& params) {
     options.target = chosen<Target>(params, "target", kTargets);
     constexpr std::string_view kAmounts[] = {"", "threshold", "psnr", "max_error", "bpv", "ratio"};
     if (options.target != Target::lossless) options.amount = params.real(kAmounts[int(options.target)]);
-    options.coder = chosen<CoderKind>(params, "coder", kCoders);
+    options.coder = kCoderOf[chosen<std::size_t>(params, "coder", kCoders)];
     options.brick = std::stoi(params.text("brick"));
     options.faces = chosen<Faces>(params, "faces", kFaces);
     options.rounding = chosen<Rounding>(params, "rounding", kRoundings);
@@ -53,7 +54,7 @@ std::vector<ParamSpec> encoding_params() {
             .range(1e-6, 256).slider(0.05, 8, Scale::logarithmic).in_unit("bits").shown_if("target", {"bpv"}).is_quality(),
         param::real("ratio", 20, "Bytes of the original over bytes of the result.")
             .range(1, 1e6).slider(2, 200, Scale::logarithmic).shown_if("target", {"ratio"}).is_quality(),
-        param::choice("coder", kCoders, "dense", "The entropy coder: the paper's run lengths and fixed code, adaptive contexts, or static tables over blocks."),
+        param::choice("coder", kCoders, "dense", "The entropy coder: the paper's run lengths and fixed code, adaptive contexts, or static tables and 32 lanes."),
         param::choice("brick", {"8", "16", "32"}, "16",
                       "Voxels of a brick along each axis: larger ones compress better, smaller ones are fetched faster.")
             .in_group("Tree"),
@@ -122,7 +123,7 @@ With `faces: shared` a family takes in one layer of its upper neighbours, and bo
 itself: absent details are then linear interpolation across faces, too, where `block` repeats the last sample.
 
 `dense` codes with mixed adaptive contexts that start from a state learned once for the file; `paper` is the run-length and
-fixed Huffman code of the paper, `fast` static interleaved rANS over blocks of 4^3.
+fixed Huffman code of the paper, `fast` static contexts and 32 interleaved rANS states, decoded side by side.
 
 The volume is read slab by slab. Coarse levels and compressed bytes that go beyond `memory` wait in temporary files
 ($TMPDIR) without a name; the result does not depend on it.
