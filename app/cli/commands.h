@@ -85,6 +85,6 @@ struct EditArguments {
     double scale = 0;                        // 0: the screen's own
     std::filesystem::path screen;            // where to write what is on the screen; empty: nowhere
 };
-int edit(const EditArguments& arguments);
+int edit(const EditArguments& arguments, std::stop_token stop);
 
 }  // namespace voxloom::cli

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <utility>
 
 #include "app/cli/commands.h"
 #include "app/cli/session.h"
@@ -9,7 +10,7 @@
 
 namespace voxloom::cli {
 
-int edit(const EditArguments& arguments) {
+int edit(const EditArguments& arguments, std::stop_token stop) {
 #if defined(VOXLOOM_EDITOR)
     editor::EditArguments window;
     char end = 0;
@@ -18,11 +19,12 @@ int edit(const EditArguments& arguments) {
         fail("--size {}: write WIDTHxHEIGHT, from 320x240 to 16384x16384", arguments.size);
     window.graph = arguments.graph;
     window.out = arguments.out;
+    window.stop = std::move(stop);
     window.scale = arguments.scale;
     window.screen = arguments.screen;
     return editor::run_window(window, load_registry());
 #else
-    (void)arguments;
+    (void)arguments, (void)stop;
     fail("this program was built without the editor; install libimgui-dev, libstb-dev and libglfw3-dev, then build again");
 #endif
 }

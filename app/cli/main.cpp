@@ -174,7 +174,7 @@ int main(int argc, char** argv) {
         ->check(CLI::Range(0.0, 8.0))->capture_default_str();
     command->add_option("--screen", edit.screen,
                         "Write what is on the screen to this file (JSON) whenever it is drawn");
-    command->callback([&] { status = cli::edit(edit); });
+    command->callback([&] { status = cli::edit(edit, stop_source.get_token()); });
 
     try {
         require_command(app, argc > 1 ? argv[1] : "");

@@ -278,6 +278,55 @@ TEST_F(Window, picturesOfTwoBranchesAreComparedWithLinkedCameras) {
     editor.key("c");
     editor.wait_for("the difference", both);
     keep(editor.screenshot(), "difference");
+    editor.key("c");
+    editor.wait_for("one picture", [](const json& now) { return now["shown"].size() == 1; });
+    editor.click("picture-port:0");
+    editor.click("show:error.table");
+    editor.wait_for("the table", [](const json& now) { return now["shown"] == json::array({"error.table"}) && shows_final(now, "error.table"); });
+    keep(editor.screenshot(), "table");
+}
+
+// As somebody who has read nothing: every click, key and typed word counts.
+TEST_F(Window, aNewcomerComparesTwoCodecsOnTheEngineInFewActions) {
+    VOXLOOM_NEEDS_DATA(data);
+    VirtualDisplay display(1600, 900);
+    EditorProcess editor(display, folder.path() / "e", {"--size", "1600x900"});
+    int actions = 0;
+    auto click = [&](const std::string& item) {
+        editor.click(item);
+        ++actions;
+    };
+    click("example:codecs.yaml");
+    click("node:ct");
+    editor.click("param:ct.path", 0.1);
+    editor.key("a", "ctrl");
+    editor.type((data / "engine.nrrd").string());
+    editor.key("Return");
+    actions += 4;
+    auto both = [](const json& s) { return shows_final(s, "wavelet-view.image") && shows_final(s, "zfp-view.image"); };
+    json s = editor.wait_for("two pictures", both);
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("engine.nrrd"));
+    editor.key("c");  // side by side
+    ++actions;
+    click("node:wavelet");
+    editor.click("param:wavelet.max_error");
+    ++actions;
+    editor.move_to("picture:0", 0.4, 0.6);
+    editor.press();
+    editor.move_by(60, 0);
+    editor.release();
+    ++actions;
+    editor.wait_for("the turned pictures", both);
+    keep(editor.screenshot(), "newcomer-pictures");
+    for (std::size_t left = 3; left-- > 0;) editor.key("c");
+    editor.wait_for("one picture", [](const json& now) { return now["shown"].size() == 1; });
+    click("picture-port:0");
+    click("show:errors.table");
+    actions += 3;
+    s = editor.wait_for("the table", [](const json& now) { return now["shown"] == json::array({"errors.table"}) && shows_final(now, "errors.table"); });
+    EXPECT_EQ(s["problems"], 0);
+    EXPECT_LE(actions, 25);
+    keep(editor.screenshot(), "newcomer-table");
 }
 
 TEST_F(Window, everythingIsReadableOnALargeScreen) {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <exception>
 #include <fstream>
 
 #include "core/base/error.h"
@@ -43,7 +44,7 @@ Autosave::Autosave(fs::path folder) : file_(folder / fmt::format("{}.unsaved", g
 
 Autosave::~Autosave() {
     std::error_code error;
-    if (there_) fs::remove(file_, error);
+    if (there_ && std::uncaught_exceptions() == 0) fs::remove(file_, error);
 }
 
 void Autosave::update(const Workspace& workspace, double now, double seconds) {

@@ -16,7 +16,7 @@ std::filesystem::path autosave_folder();
 class Autosave {
   public:
     explicit Autosave(std::filesystem::path folder);
-    ~Autosave();  // removes the file: the session ended as it should
+    ~Autosave();  // removes the file where the session ends as it should, and not by an exception
     Autosave(const Autosave&) = delete;
     Autosave& operator=(const Autosave&) = delete;
 

@@ -171,12 +171,12 @@ void draw_text(const Row& row) {
 void draw_path(const Row& row) {
     const float button = ImGui::GetFrameHeight() + ui(4), gap = ImGui::GetStyle().ItemInnerSpacing.x;
     ImGui::SetNextItemWidth(ImGui::CalcItemWidth() - button - gap);
-    draw_text(row);
-    mark(row.editor, "param:" + row.name());
+    Editor& editor = row.editor;
+    const std::string id = row.node.id, key = row.spec.key;
+    draw_text(row);  // may replace the graph that row.node is of
+    mark(editor, "param:" + id + "." + key);
     ImGui::SameLine(0, gap);
     if (ImGui::Button("…", {button, 0})) {
-        Editor& editor = row.editor;
-        const std::string id = row.node.id, key = row.spec.key;
         const std::filesystem::path folder = editor.work.graph().folder();
         open_file_dialog(editor, FileDialog::Purpose::parameter, folder / text_of(row.shown.value),
                          [&editor, id, key](const std::filesystem::path& file) {

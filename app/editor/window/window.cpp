@@ -147,7 +147,8 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
         save_settings(editor.settings, editor.settings_file);
     }
 
-    for (int frames = kFramesAfterEvent; !editor.quit;) {
+    const std::stop_callback wake_to_stop(arguments.stop, [] { glfwPostEmptyEvent(); });
+    for (int frames = kFramesAfterEvent; !editor.quit && !arguments.stop.stop_requested();) {
         const bool held = ImGui::IsAnyMouseDown() || editor.moving;
         if (frames > 0 || held)
             glfwPollEvents();
@@ -168,6 +169,7 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
             glfwWaitEventsTimeout(spare);
     }
     delete_textures(editor);
+    check_stop(arguments.stop);
     return 0;
 }
 

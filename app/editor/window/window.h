@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <stop_token>
 
 #include "core/plugin/registry.h"
 
@@ -13,6 +14,7 @@ struct EditArguments {
     std::filesystem::path out = "out";        // where screenshots and written files go
     glm::ivec2 size{1600, 960};               // of the window, in its screen's coordinates
     double scale = 0;                         // pixels a unit; 0: the screen's own
+    std::stop_token stop;                     // of the program: what is not saved is found by the next session
     std::filesystem::path screen;             // where to write what is on the screen; empty: nowhere
 };
 
