@@ -21,7 +21,7 @@
 #include "core/base/error.h"
 #include "plugins/codec-wavelet/adaptive_number.h"
 #include "plugins/codec-wavelet/bit_io.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/token.h"
 
 namespace voxloom::wavelet {

@@ -7,11 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/family.h"
 
 namespace voxloom::wavelet {
-
-using Bytes = std::vector<std::byte>;
 
 enum class CoderKind : std::uint8_t { paper = 0, dense = 1, blocks = 2, fast = 3 };  // blocks is only read
 inline constexpr int kCoderKinds = 4;

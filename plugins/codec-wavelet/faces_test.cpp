@@ -7,7 +7,7 @@
 
 #include "core/data/brick_cache.h"
 #include "core/data/convert.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/encoder.h"
 #include "plugins/codec-wavelet/level_store.h"
 #include "tests/support/volumes.h"

@@ -21,7 +21,7 @@
 
 #include "core/base/error.h"
 #include "plugins/codec-wavelet/bit_io.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/lane_edges.h"
 #include "plugins/codec-wavelet/lane_tables.h"
 #include "plugins/codec-wavelet/sparse_list.h"

@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/hash.h"
 #include "core/base/output_file.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/passes.h"
 #include "plugins/codec-wavelet/statistics_code.h"
 

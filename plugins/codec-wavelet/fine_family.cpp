@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/passes.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"

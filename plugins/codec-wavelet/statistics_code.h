@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"
 
 namespace voxloom::wavelet {

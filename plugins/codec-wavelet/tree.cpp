@@ -6,7 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/data/convert.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 
 namespace voxloom::wavelet {
 

@@ -89,7 +89,7 @@ class FamilyCodec {
 
     // --- decoder ---
     // Bytes of the coder's part are taken off `in`.
-    void decode(FamilyId family, const Planes& low, class ByteReader& in, Planes& planes) const;
+    void decode(FamilyId family, const Planes& low, ByteReader& in, Planes& planes) const;
 
     // Voxels of the volume's type, components interleaved, from the tree's integers; clamped to the
     // volume's range, where it is known, and its type.
@@ -102,7 +102,7 @@ class FamilyCodec {
     void quantise_block(Details& d, const Band& band, glm::ivec3 lo, glm::ivec3 hi, double scale) const;
     void rebuild(Details& d) const;
     void encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const;
-    void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, class ByteReader& in) const;
+    void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, ByteReader& in) const;
 
     const TreeDesc& tree_;
     const Coder& coder_;

@@ -5,7 +5,7 @@
 #include "core/base/error.h"
 #include "core/base/hash.h"
 #include "core/data/convert.h"
-#include "plugins/codec-wavelet/byte_io.h"
+#include "core/base/byte_io.h"
 #include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/mask_layer.h"
 #include "plugins/codec-wavelet/passes.h"
