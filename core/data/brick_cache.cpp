@@ -52,6 +52,8 @@ struct Flight {
 //    the turn: it keeps what it has, and what becomes free goes to it alone.
 //  - `active` counts the threads that are at work here and not asleep. The last one awake, if it
 //    needs memory, knows that none will come, and fails.
+//  - A thread that is woken and falls asleep again takes nothing in between, since giving it back
+//    would wake the others: two such threads would keep each other up, and nobody would be the last.
 struct BrickCache::State : std::enable_shared_from_this<BrickCache::State> {
     class Lease;
     class Working;
@@ -277,9 +279,11 @@ BrickCache::State::Lease BrickCache::State::acquire(const BricksPtr& source, Bri
         Entry* found = nullptr;
         while (there < path.size() && !(found = find(identity, path[there]))) ++there;
         if (first_look) ++(found && there == 0 ? counters.hits : counters.misses);
-        Lease before = std::exchange(ancestor, found ? lease(*found) : Lease());
-        before.give_back();
-        if (found && there == 0) return ancestor;
+        if (found && there == 0) {
+            Lease wanted = lease(*found);
+            ancestor.give_back();
+            return wanted;
+        }
 
         const BrickId next = path[there - 1];
         const FamilyKey family{identity, found ? path[there] : next, !found};
@@ -291,22 +295,25 @@ BrickCache::State::Lease BrickCache::State::acquire(const BricksPtr& source, Bri
             if (flight->error) throw Error(*flight->error);
             continue;
         }
+        const bool may_take = nested || turn == nullptr || turn == &me;
+        if (!may_take) {
+            ancestor.give_back();
+            sleep(lock, stop);
+            continue;
+        }
+        Lease before = std::exchange(ancestor, found ? lease(*found) : Lease());
+        before.give_back();
 
         const std::uint64_t bytes = source->family_bytes(next);
-        const bool may_take = nested || turn == nullptr || turn == &me;
-        if (!may_take || !reserve(bytes)) {
-            if (may_take) {
-                if (!nested) turn = &me;
-                if (active == 1 || stuck) {
-                    stuck = false;
-                    fail("brick cache: {} of its {} are in use, too much for decoding {} more of {}; "
-                         "raise the limit of the brick cache, or hold fewer bricks at a time",
-                         human_bytes(double(counters.bytes - idle_bytes)), human_bytes(double(limit)),
-                         human_bytes(double(bytes)),
-                         source->desc().volume.name.empty() ? "a volume" : source->desc().volume.name);
-                }
-            } else {
-                ancestor.give_back();
+        if (!reserve(bytes)) {
+            if (!nested) turn = &me;
+            if (active == 1 || stuck) {
+                stuck = false;
+                fail("brick cache: {} of its {} are in use, too much for decoding {} more of {}; "
+                     "raise the limit of the brick cache, or hold fewer bricks at a time",
+                     human_bytes(double(counters.bytes - idle_bytes)), human_bytes(double(limit)),
+                     human_bytes(double(bytes)),
+                     source->desc().volume.name.empty() ? "a volume" : source->desc().volume.name);
             }
             sleep(lock, stop);
             continue;
