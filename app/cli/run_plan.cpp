@@ -107,7 +107,8 @@ void print_messages(const Plan& plan, const RunResult& result) {
         for (const std::string& warning : r.warnings) say("warning: " + warning);
         if (r.state == NodeState::failed) say(r.error);
         // What the check found was said before; the writers behind outputs are nobody's nodes.
-        if (r.state == NodeState::not_run && plan.nodes[i].ok && plan.nodes[i].mark.line > 0)
+        const bool said = !plan.nodes[i].ok && plan.nodes[i].off.empty();
+        if (r.state == NodeState::not_run && !said && plan.nodes[i].mark.line > 0)
             say("not run: " + r.error);
     }
 }

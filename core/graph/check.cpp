@@ -121,6 +121,8 @@ class NodeDescription final : public Description {
 };
 
 class Checker {
+    using Use = GraphNode::Use;
+
   public:
     Checker(const Graph& graph, const Registry& registry, const CheckOptions& options)
         : graph_(graph),
@@ -168,7 +170,9 @@ class Checker {
     }
 
     Plan::Node& node(int i) { return plan_.nodes[std::size_t(i)]; }
-    const GraphNode& text_of(int i) const { return graph_.nodes[std::size_t(i)]; }
+    const GraphNode& text_of(int i) const {
+        return graph_.nodes[std::size_t(order_.empty() ? i : order_[std::size_t(i)])];
+    }
     int count() const { return int(plan_.nodes.size()); }
 
     // --- 1: types and parameters. Until they are sorted, nodes stand in the order of the text. ---
@@ -182,20 +186,27 @@ class Checker {
             n.id = text.id;
             n.mark = text.mark;
             n.ok = true;
+            n.use = text.use;
             index_.emplace(text.id, i);
             n.type = registry_.find(text.type);
-            if (!n.type) {
+            if (n.use != Use::normal) {
+                n.ok = false;
+                n.off = fmt::format("it is {}", name_of(n.use));
+            }
+            if (!n.type && n.use != Use::disabled) {
                 node_problem(
                     i, text.type_mark, {},
                     fmt::format("unknown node type '{}'{}{}", text.type, near_type_(text.type),
                                 near_type_(text.type).empty()
                                     ? "; 'voxloom nodes' lists what there is"
                                     : ""));
-                continue;
+                n.off.clear();
             }
+            if (!n.type) continue;
             n.params = Params(n.type->params, plan_.folder);
             n.inputs.resize(n.type->inputs.size());
             for (const PortSpec& port : n.type->outputs) n.outputs.emplace_back(type_of(port));
+            if (n.use != Use::normal) continue;
             for (const GraphParam& param : text.params) set_param(i, param);
         }
     }
@@ -291,9 +302,11 @@ class Checker {
     // ------------------------------------------------------------------------------------
 
     void read_wires() {
+        sources_.resize(graph_.nodes.size());
         for (int i = 0; i < count(); ++i) {
+            if (node(i).use == Use::disabled) continue;
             for (const GraphInput& input : text_of(i).inputs) read_input(i, input);
-            if (!node(i).type) continue;
+            if (!node(i).type || node(i).use != Use::normal) continue;
             for (const PortSpec& port : node(i).type->inputs)
                 if (!port.optional && !is_mentioned(i, port.key))
                     node_problem(i, node(i).mark, port.key,
@@ -325,10 +338,57 @@ class Checker {
                                      port->types.text()));
         for (const WireEnd& end : input.from) {
             std::optional<Plan::Source> source = find_source(i, end, input.port);
-            if (!source || source->output < 0 || !port || !accepts(i, *port, *source, end))
-                continue;
+            if (!source || !port || node(i).use != Use::normal) continue;
+            if (node(source->node).use == Use::bypassed) {
+                source = passed(*source, port->types, fmt::format("'{}'", node(i).id));
+                node(i).ok = node(i).ok && source;
+                if (!source) continue;
+                sources_[std::size_t(i)].push_back(source->node);
+            }
+            // What an unknown node gives is not known; it is disabled, or there would be no source.
+            if (source->output >= 0 && !accepts(i, *port, *source, end)) continue;
             node(i).inputs[std::size_t(port - type->inputs.data())].push_back(*source);
         }
+    }
+
+    // Where a bypassed node's output comes from, through all the bypassed nodes there are. Nothing
+    // where there is nothing to pass on, which is a problem where somebody (`consumer`) asks for it.
+    std::optional<Plan::Source> passed(Plan::Source source, PortTypes accepted,
+                                       const std::string& consumer) {
+        for (int steps = 0; node(source.node).use == Use::bypassed; ++steps) {
+            const int i = source.node;
+            const NodeType* type = node(i).type;
+            if (!type || source.output < 0 || node(i).off.empty()) return {};  // said already
+            const PortSpec& output = type->outputs[std::size_t(source.output)];
+            std::optional<Plan::Source> next;
+            if (steps < count()) next = first_input(i, output.types);
+            if (!next && steps < count()) next = first_input(i, accepted);
+            if (!next) {
+                if (consumer.empty()) return {};
+                node_problem(i, node(i).mark, output.key,
+                             fmt::format("it cannot be bypassed: nothing that is wired to it could stand "
+                                         "for its output '{}' ({}), asked for by {}; disable it instead",
+                                         output.key, output.types.text(), consumer));
+                node(i).off.clear();
+                return {};
+            }
+            source = *next;
+        }
+        return source;
+    }
+
+    // What is wired to a node's first input that gets one of these types, as far as that is right.
+    std::optional<Plan::Source> first_input(int i, PortTypes types) {
+        for (const PortSpec& port : node(i).type->inputs)
+            for (const GraphInput& input : text_of(i).inputs) {
+                if (input.port != port.key || input.from.empty()) continue;
+                auto found = index_.find(input.from.front().node);
+                const NodeType* from = found == index_.end() ? nullptr : node(found->second).type;
+                const PortSpec* output = from ? from->find_output(input.from.front().port) : nullptr;
+                if (output && types.has(type_of(*output)))
+                    return Plan::Source{found->second, int(output - from->outputs.data())};
+            }
+        return {};
     }
 
     // Which output a wire or the graph's outputs name; consumer is -1 for the latter. The output is
@@ -347,12 +407,11 @@ class Checker {
             return {};
         }
         int i = found->second;
-        if (consumer >= 0) {
-            sources_.resize(graph_.nodes.size());
-            sources_[std::size_t(consumer)].push_back(
-                i);  // even where the port is wrong: for the order
-        }
+        // Even where the port is wrong: for the order. What does not run waits for nothing.
+        if (consumer >= 0 && node(consumer).use == Use::normal)
+            sources_[std::size_t(consumer)].push_back(i);
         const NodeType* type = node(i).type;
+        if (!type && node(i).use == Use::disabled) return Plan::Source{i, -1};
         if (!type) return {};
         if (end.port.empty()) {
             bool writer = type->writes_files || type->outputs.empty();
@@ -425,7 +484,6 @@ class Checker {
     // which is the order of evaluation; one of several nodes, or of a node that feeds itself, is a
     // cycle.
     void sort_and_find_cycles() {
-        sources_.resize(graph_.nodes.size());
         std::size_t n_nodes = graph_.nodes.size();
         std::vector<int> order, component, number(n_nodes, -1), low(n_nodes);
         std::vector<bool> open(n_nodes);
@@ -544,9 +602,11 @@ class Checker {
     void describe_nodes() {
         for (int i = 0; i < count(); ++i) {
             Plan::Node& n = node(i);
-            for (int from : sources_[std::size_t(i)]) n.ok = n.ok && node(from).ok;
+            take_off(i);
+            for (int from : sources_[std::size_t(i)])
+                n.ok = n.ok && (node(from).ok || !node(from).off.empty());
             if (!n.ok || !n.type->describe) continue;
-            const GraphNode& text = text_of(order_[std::size_t(i)]);
+            const GraphNode& text = text_of(i);
             NodeDescription description(plan_, n, plan_.problems, text);
             try {
                 n.type->describe(description);
@@ -560,24 +620,74 @@ class Checker {
         }
     }
 
+    // Takes wires from what is off away; where that cannot be, the node is off, too.
+    void take_off(int i) {
+        Plan::Node& n = node(i);
+        for (std::size_t k = 0; k < n.inputs.size() && n.use == Use::normal; ++k) {
+            auto is_off = [&](const Plan::Source& source) { return !node(source.node).off.empty(); };
+            auto off = std::find_if(n.inputs[k].begin(), n.inputs[k].end(), is_off);
+            if (off == n.inputs[k].end()) continue;
+            const Plan::Node& source = node(off->node);
+            const PortSpec& port = n.type->inputs[k];
+            const std::string why = source.use == Use::normal
+                                        ? source.off
+                                        : fmt::format("it needs '{}', which is disabled", source.id);
+            std::erase_if(n.inputs[k], is_off);
+            if (port.optional || (port.many && !n.inputs[k].empty())) {
+                plan_.warnings.push_back(fmt::format("node '{}' runs without '{}' at its input '{}', "
+                                                     "which is off: {}",
+                                                     n.id, source.id, port.key, source.off));
+            } else {
+                n.off = why;
+                n.ok = false;
+            }
+        }
+    }
+
     // --- 5: what is asked for
     // --------------------------------------------------------------------------
 
     void find_wanted() {
         for (const WireEnd& end : graph_.outputs)
-            if (auto source = find_source(-1, end, {})) plan_.wanted.push_back(*source);
-        if (!graph_.outputs.empty()) return;
+            if (auto source = find_source(-1, end, {})) want(*source, "the graph's outputs");
+        if (graph_.outputs.empty()) want_what_nobody_takes();
+        if (plan_.wanted.empty() && left_out_ && plan_.problems.empty())
+            problem({1, 1}, {}, {},
+                    "there is nothing to run: what is asked for is disabled, or needs what is");
+    }
+
+    // A wire counts as taken where its node does not run, too: what was of no interest before a node
+    // was disabled is of none afterwards.
+    void want_what_nobody_takes() {
         std::vector<bool> consumed(plan_.nodes.size());
-        for (const auto& sources : sources_)
-            for (int from : sources) consumed[std::size_t(from)] = true;
+        for (const GraphNode& text : graph_.nodes)
+            for (const GraphInput& input : text.inputs)
+                for (const WireEnd& end : input.from)
+                    if (auto found = index_.find(end.node); found != index_.end())
+                        consumed[std::size_t(found->second)] = true;
         for (int i = 0; i < count(); ++i) {
             const NodeType* type = node(i).type;
             if (consumed[std::size_t(i)] || !type) continue;
             if (type->writes_files || type->outputs.empty())
-                plan_.wanted.push_back({i, -1});
+                want({i, -1}, {});
             else
-                for (int o = 0; o < int(type->outputs.size()); ++o) plan_.wanted.push_back({i, o});
+                for (int o = 0; o < int(type->outputs.size()); ++o) want({i, o}, {});
         }
+    }
+
+    void want(Plan::Source source, const std::string& who) {
+        const int asked = source.node;
+        if (node(asked).use == Use::bypassed && source.output >= 0) {
+            const PortTypes types = node(asked).type->outputs[std::size_t(source.output)].types;
+            auto through = passed(source, types, who);
+            if (!through) return void(left_out_ = true);
+            source = *through;
+        }
+        const Plan::Node& n = node(source.node);
+        if (n.off.empty()) return plan_.wanted.push_back(source);
+        left_out_ = true;
+        if (n.use == Use::normal || !who.empty())
+            plan_.warnings.push_back(fmt::format("'{}' is left out: {}", node(asked).id, n.off));
     }
 
     // What everything asked for takes when it is all in memory at once: an upper bound, since
@@ -642,7 +752,8 @@ class Checker {
     std::unordered_map<std::string_view, int> index_;
     std::vector<std::vector<int>>
         sources_;             // nodes that feed each node, of every wire that names one
-    std::vector<int> order_;  // of evaluation, as indices into graph_.nodes
+    std::vector<int> order_;  // of evaluation, as indices into graph_.nodes; empty until sorted
+    bool left_out_ = false;   // something that was asked for is off
     std::vector<std::vector<std::string>> examples_;  // node types by the PortType they make
 };
 

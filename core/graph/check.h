@@ -18,7 +18,11 @@ struct Plan {
     };
     struct Node {
         std::string id;
-        const NodeType* type = nullptr;  // null: unknown type (a problem)
+        const NodeType* type = nullptr;  // null: unknown type (a problem, unless it is disabled)
+        GraphNode::Use use = GraphNode::Use::normal;
+        // Why it does not run though nothing is wrong with it: "it is disabled", "it needs 'ct', which
+        // is disabled"; empty: it does. What is off is not ok.
+        std::string off;
         Params params;
         std::vector<std::vector<Source>> inputs;  // by index of type->inputs; empty: not wired
         std::vector<ValueDesc> outputs;           // described, by index of type->outputs
@@ -44,6 +48,13 @@ struct CheckOptions {
     std::uint64_t memory_limit = 0;  // warn when the dense outputs exceed it; 0: physical memory
 };
 
+// Nodes that are not used:
+//  - A bypassed node does not run. What is wired to one of its outputs gets what its first input of the
+//    same type gets, else its first input of a type that the consumer takes, too. Where there is no
+//    such input it is a problem of the node, which names the output and who asks for it.
+//  - A disabled node does not run, and nothing of it is checked. An input that can do without it is as
+//    if it were not wired; a node that cannot does not run either, which is no problem.
+//
 // Every problem is found, not only the first: types, ports, wires, cycles, parameters, shapes.
 // The plan is usable for the nodes that are ok.
 Plan check(const Graph& graph, const Registry& registry, const CheckOptions& options = {});

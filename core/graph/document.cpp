@@ -24,6 +24,11 @@ std::string Problem::text(const fs::path& file) const {
                         : fmt::format("{}: node '{}': {}", place, node, message);
 }
 
+std::string_view name_of(GraphNode::Use use) {
+    constexpr std::string_view names[] = {"normal", "bypassed", "disabled"};
+    return names[std::size_t(use)];
+}
+
 const GraphNode* Graph::find(std::string_view id) const {
     for (const GraphNode& node : nodes)
         if (node.id == id) return &node;
@@ -134,6 +139,11 @@ void require_text(const ParamValue& value, std::string_view what) {
     if (auto* text = std::get_if<std::string>(&value)) require_text(*text, what);
     if (auto* texts = std::get_if<std::vector<std::string>>(&value))
         for (const std::string& text : *texts) require_text(text, what);
+}
+
+void require_text(const GraphParam::Yaml& yaml) {
+    require_text(yaml.text, "a text of the editor's own");
+    for (const GraphParam::Yaml& item : yaml.items) require_text(item);
 }
 
 template <class T, class Name>
@@ -287,6 +297,12 @@ void Document::disconnect(const std::string& to_node, const std::string& to_port
     apply(wanted);
 }
 
+void Document::set_use(const std::vector<std::string>& ids, GraphNode::Use use) {
+    Graph wanted = graph_;
+    for (const std::string& id : ids) node_of(wanted, id).use = use;
+    apply(wanted);
+}
+
 void Document::move_node(const std::string& id, glm::dvec2 at) { move_nodes({{id, at}}); }
 
 void Document::move_nodes(const std::vector<std::pair<std::string, glm::dvec2>>& places) {
@@ -305,6 +321,21 @@ void Document::set_outputs(const std::vector<std::pair<std::string, std::string>
         node_of(wanted, node);
         if (!port.empty()) require_name(port, "name of a port");
         wanted.outputs.push_back({node, port, {}});
+    }
+    apply(wanted);
+}
+
+void Document::set_editor(const std::string& key, const GraphParam::Yaml& value) {
+    require_name(key, "key of the editor's own");
+    require_text(value);
+    Graph wanted = graph_;
+    auto found = find_by(wanted.editor, &GraphParam::key, key);
+    if (value.kind == GraphParam::Yaml::Kind::list && value.items.empty()) {
+        if (found != wanted.editor.end()) wanted.editor.erase(found);
+    } else {
+        GraphParam& entry = found != wanted.editor.end() ? *found : wanted.editor.emplace_back();
+        entry.key = key;
+        entry.yaml = value;
     }
     apply(wanted);
 }

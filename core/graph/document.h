@@ -57,13 +57,18 @@ struct GraphNode {
     std::string id, type;
     std::vector<GraphInput> inputs;
     std::vector<GraphParam> params;
+    // As `use: bypassed` or `use: disabled`; what that means is said in check.h.
+    enum class Use { normal, bypassed, disabled } use = Use::normal;
     std::optional<glm::dvec2> at;  // where the editor draws it
     Mark mark, type_mark;
 };
+std::string_view name_of(GraphNode::Use use);  // "normal", "bypassed", "disabled"
+
 struct Graph {
     std::filesystem::path file;    // for messages; its folder is the base of relative paths
     std::vector<GraphNode> nodes;
     std::vector<WireEnd> outputs;  // port may be empty: the node itself (a writer)
+    std::vector<GraphParam> editor;  // what an editor keeps for itself; it means nothing to a run
     const GraphNode* find(std::string_view id) const;  // linear; check() builds an index
 
     std::filesystem::path folder() const;
@@ -108,10 +113,13 @@ class Document {
     void connect(const std::string& from_node, const std::string& from_port,
                  const std::string& to_node, const std::string& to_port, bool append = false);
     void disconnect(const std::string& to_node, const std::string& to_port);
+    void set_use(const std::vector<std::string>& ids, GraphNode::Use use);
     void move_node(const std::string& id, glm::dvec2 at);
     void move_nodes(const std::vector<std::pair<std::string, glm::dvec2>>& places);
     // Of node and port (empty: the node itself); an empty list removes the key.
     void set_outputs(const std::vector<std::pair<std::string, std::string>>& outputs);
+    // One key of Graph::editor; an empty list removes it.
+    void set_editor(const std::string& key, const GraphParam::Yaml& value);
 
     bool can_undo() const { return done_ > 0; }
     bool can_redo() const { return done_ < history_.size(); }

@@ -267,7 +267,8 @@ RunResult Run::operator()() {
                 reports_[i].bytes_out = result->bytes;
                 finish(int(i), NodeState::cached, {}, result);
             } else if (!plan_.nodes[i].ok) {
-                finish(int(i), NodeState::not_run, "the check found a problem", nullptr);
+                finish(int(i), NodeState::not_run,
+                       plan_.nodes[i].off.empty() ? "the check found a problem" : plan_.nodes[i].off, nullptr);
             } else if (runs_[i].waiting_for == 0 && reports_[i].state == NodeState::waiting) {
                 start(int(i));
             }

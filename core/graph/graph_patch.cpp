@@ -35,8 +35,13 @@ Yaml yaml_of(const std::vector<WireEnd>& ends, bool is_list) {
     return list;
 }
 
-std::string to_text(glm::dvec2 at) {
-    return fmt::format("[{}, {}]", shortest(at.x), shortest(at.y));
+// Empty where the key is left out.
+std::string text_of(std::optional<glm::dvec2> at) {
+    return at ? fmt::format("[{}, {}]", shortest(at->x), shortest(at->y)) : "";
+}
+
+std::string text_of(GraphNode::Use use) {
+    return use == GraphNode::Use::normal ? "" : std::string(name_of(use));
 }
 
 // Quoted only where it would not read back: the keys of a graph are names such as x, y and n.
@@ -82,9 +87,10 @@ std::string to_text(const std::vector<Entry>& entries) {
 // "id: ct", "type: readers.volume", ...: the lines of a node.
 std::vector<std::string> lines_of(const GraphNode& node) {
     std::vector<std::string> lines{"id: " + scalar(node.id), "type: " + scalar(node.type)};
+    if (std::string use = text_of(node.use); !use.empty()) lines.push_back("use: " + use);
     if (!node.inputs.empty()) lines.push_back("in: " + to_text(entries_of(node.inputs)));
     if (!node.params.empty()) lines.push_back("set: " + to_text(entries_of(node.params)));
-    if (node.at) lines.push_back("at: " + to_text(*node.at));
+    if (std::string at = text_of(node.at); !at.empty()) lines.push_back("at: " + at);
     return lines;
 }
 
@@ -112,7 +118,7 @@ bool same(const std::vector<Entry>& a, const std::vector<Entry>& b) {
 }
 
 bool same(const GraphNode& a, const GraphNode& b) {
-    return a.id == b.id && a.type == b.type && a.at == b.at &&
+    return a.id == b.id && a.type == b.type && a.use == b.use && a.at == b.at &&
            std::equal(a.inputs.begin(), a.inputs.end(), b.inputs.begin(), b.inputs.end(),
                       [](const GraphInput& x, const GraphInput& y) {
                           return x.port == y.port && x.is_list == y.is_list &&
@@ -134,6 +140,7 @@ class Patcher {
 
     std::vector<TextPatch> run(const Graph& from, const Graph& to) {
         patch_outputs(from.outputs, to.outputs);
+        patch_entries(root_, "editor", entries_of(from.editor), entries_of(to.editor));
         patch_nodes(from.nodes, to.nodes);
         std::stable_sort(
             patches_.begin(), patches_.end(),
@@ -234,14 +241,21 @@ class Patcher {
         if (from.type != to.type) replace_value(map, map.index_of("type"), scalar(to.type));
         patch_entries(map, "in", entries_of(from.inputs), entries_of(to.inputs));
         patch_entries(map, "set", entries_of(from.params), entries_of(to.params));
-        if (from.at == to.at) return;
-        int at = map.index_of("at");
-        if (!to.at)
+        patch_key(map, "use", text_of(from.use), text_of(to.use));
+        patch_key(map, "at", text_of(from.at), text_of(to.at));
+    }
+
+    // A key whose value is written anew, and left out where it is empty.
+    void patch_key(const YamlNode& map, std::string_view key, const std::string& from,
+                   const std::string& to) {
+        if (from == to) return;
+        int at = map.index_of(key);
+        if (to.empty())
             remove_entries(map, {at});
         else if (at < 0)
-            insert_entry(map, predecessor(map, "at"), "at: " + to_text(*to.at));
+            insert_entry(map, predecessor(map, key), fmt::format("{}: {}", key, to));
         else
-            replace_value(map, at, to_text(*to.at));
+            replace_value(map, at, to);
     }
 
     void patch_entries(const YamlNode& node, std::string_view name, const std::vector<Entry>& from,
@@ -267,14 +281,15 @@ class Patcher {
             if (!find(from, entry.key)) insert_entry(map, int(map.keys.size()) - 1, to_text(entry));
     }
 
-    // The entry behind which a key of a node goes, so that nodes read id, type, in, set, at.
+    // The entry behind which a key of a node goes, so that nodes read id, type, use, in, set, at; other
+    // keys go last.
     static int predecessor(const YamlNode& node, std::string_view name) {
         int at = -1;
-        for (std::string_view before : {"id", "type", "in", "set", "at"}) {
-            if (before == name) break;
+        for (std::string_view before : {"id", "type", "use", "in", "set", "at"}) {
+            if (before == name) return at;
             at = std::max(at, node.index_of(before));
         }
-        return at;
+        return int(node.keys.size()) - 1;
     }
 
     void patch_value(const YamlNode& map, int i, const Yaml& from, const Yaml& to) {
@@ -508,7 +523,7 @@ std::string to_text(const Yaml& yaml) {
 }
 
 bool same_content(const Graph& a, const Graph& b) {
-    return same_wires(a.outputs, b.outputs) &&
+    return same_wires(a.outputs, b.outputs) && same(entries_of(a.editor), entries_of(b.editor)) &&
            std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
                       [](const GraphNode& x, const GraphNode& y) { return same(x, y); });
 }

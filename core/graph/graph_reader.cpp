@@ -45,9 +45,11 @@ class GraphReader {
         }
         // A file of another version may differ in everything else, so only that is said.
         if (!read_version(root)) return {};
-        check_keys(root, {"voxloom", "outputs", "nodes"}, "a graph");
+        check_keys(root, kGraphKeys, "a graph");
         if (const YamlNode* outputs = root.find("outputs")) read_outputs(*outputs);
         if (const YamlNode* nodes = root.find("nodes")) read_nodes(*nodes);
+        if (const YamlNode* editor = root.find("editor"))
+            read_entries(*editor, "editor", "{ comments: [[a text, 0, 0]] }", graph_.editor);
         return std::move(graph_);
     }
 
@@ -86,6 +88,8 @@ class GraphReader {
     }
 
   private:
+    static inline const std::vector<std::string> kGraphKeys{"voxloom", "outputs", "nodes", "editor"};
+
     void problem(const YamlNode& at, std::string message, std::string where = {}) {
         problems_.push_back({at.mark, id_, std::move(where), std::move(message)});
     }
@@ -103,7 +107,7 @@ class GraphReader {
         if (!version) {
             // Perhaps misspelt; then that is the better message.
             std::size_t before = problems_.size();
-            check_keys(root, {"voxloom", "outputs", "nodes"}, "a graph");
+            check_keys(root, kGraphKeys, "a graph");
             problem(
                 root,
                 "there is no 'voxloom: 1', which says that this is a graph and of which version");
@@ -175,7 +179,7 @@ class GraphReader {
         } else {
             problem(map, "this node has no 'id'; give it a name");
         }
-        check_keys(map, {"id", "type", "in", "set", "at"}, "a node");
+        check_keys(map, {"id", "type", "use", "in", "set", "at"}, "a node");
         if (const YamlNode* type = map.find("type");
             type && type->is_scalar() && !type->text.empty()) {
             node.type = type->text;
@@ -184,10 +188,22 @@ class GraphReader {
             problem(type ? *type : map,
                     "this node has no 'type'; 'voxloom nodes' lists what there is");
         }
+        if (const YamlNode* use = map.find("use")) read_use(*use, node);
         if (const YamlNode* in = map.find("in")) read_inputs(*in, node);
-        if (const YamlNode* set = map.find("set")) read_params(*set, node);
+        if (const YamlNode* set = map.find("set"))
+            read_entries(*set, "set", "{ size: [512, 512] }", node.params);
         if (const YamlNode* at = map.find("at")) read_at(*at, node);
         graph_.nodes.push_back(std::move(node));
+    }
+
+    void read_use(const YamlNode& value, GraphNode& node) {
+        for (auto use : {GraphNode::Use::normal, GraphNode::Use::bypassed, GraphNode::Use::disabled}) {
+            if (!value.is_scalar() || value.text != name_of(use)) continue;
+            node.use = use;
+            return;
+        }
+        problem(value, fmt::format("'use' is {}; write bypassed or disabled, or remove the key",
+                                   value.is_scalar() ? "'" + value.text + "'" : std::string(kind_name(value))));
     }
 
     void read_inputs(const YamlNode& map, GraphNode& node) {
@@ -233,12 +249,12 @@ class GraphReader {
         return end;
     }
 
-    void read_params(const YamlNode& map, GraphNode& node) {
+    void read_entries(const YamlNode& map, std::string_view name, std::string_view example,
+                      std::vector<GraphParam>& entries) {
         if (map.kind == Kind::null) return;
         if (map.kind != Kind::map) {
-            problem(map,
-                    fmt::format("'set' is {}; it must be a map, such as {{ size: [512, 512] }}",
-                                kind_name(map)));
+            problem(map, fmt::format("'{}' is {}; it must be a map, such as {}", name,
+                                     kind_name(map), example));
             return;
         }
         for (std::size_t i = 0; i < map.keys.size(); ++i) {
@@ -246,7 +262,7 @@ class GraphReader {
             param.key = map.keys[i].text;
             param.mark = map.keys[i].mark;
             if (read_value(map.items[i], param.yaml, param.key))
-                node.params.push_back(std::move(param));
+                entries.push_back(std::move(param));
         }
     }
 

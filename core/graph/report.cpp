@@ -214,6 +214,7 @@ std::string problems_to_json(const Plan& plan) {
         n["id"] = node.id;
         n["type"] = node.type ? node.type->id : "";
         n["ok"] = node.ok;
+        if (!node.off.empty()) n["off"] = node.off;
         n["outputs"] = Json::object();
         if (node.ok)
             for (std::size_t i = 0; i < node.outputs.size(); ++i)

@@ -204,6 +204,94 @@ nodes:
     EXPECT_THAT(wanted("outputs: [a.volume, t.transfer, w]"), ElementsAre("a:0", "t:1", "w:-1"));
 }
 
+// What is asked for, with what each node takes: "last(first:0)".
+std::string wiring_of(const Plan& plan) {
+    std::string all;
+    for (const Plan::Source& wanted : plan.wanted) {
+        const Plan::Node& node = plan.nodes[std::size_t(wanted.node)];
+        all += (all.empty() ? "" : " ") + node.id + "(";
+        std::string sources;
+        for (const auto& port : node.inputs)
+            for (const Plan::Source& source : port)
+                sources += (sources.empty() ? "" : " ") + plan.nodes[std::size_t(source.node)].id + ":" +
+                           std::to_string(source.output);
+        all += sources + ")";
+    }
+    return all;
+}
+
+TEST(Check, ABypassedNodePassesItsInputOn) {
+    const std::string text = R"(voxloom: 1
+nodes:
+  - { id: t, type: fake.table, in: { source: c.volume } }
+  - { id: c, type: fake.add, use: bypassed, in: { volume: b.volume }, set: { nonsense: 1 } }
+  - { id: b, type: fake.add, use: bypassed, in: { volume: a.volume } }
+  - { id: a, type: fake.source, set: { size: 5 } }
+)";
+    const Plan plan = check_text(text);
+    EXPECT_EQ(problems_of(plan), "") << "parameters of what does not run are not checked";
+    EXPECT_EQ(wiring_of(plan), "t(a:0) t(a:0)");
+    EXPECT_EQ(plan.nodes[std::size_t(plan.find("c"))].off, "it is bypassed");
+    EXPECT_TRUE(plan.nodes[std::size_t(plan.find("t"))].ok);
+    // Asked for by name, and as the last of a chain.
+    EXPECT_EQ(wiring_of(check_text("outputs: [c.volume]\n" + text)), "a()");
+    EXPECT_EQ(wiring_of(check_text("voxloom: 1\nnodes:\n  - { id: b, type: fake.add, use: bypassed, in: { volume: a.volume } }\n"
+                                   "  - { id: a, type: fake.source }\n")), "a()");
+    EXPECT_EQ(wiring_of(check_text("voxloom: 1\nnodes:\n  - { id: w, type: fake.write, use: bypassed, in: { volume: a.volume } }\n"
+                                   "  - { id: a, type: fake.source }\n")), "");
+}
+
+TEST(Check, SaysWhatCannotBeBypassed) {
+    Plan plan = check_text(R"(voxloom: 1
+nodes:
+  - { id: a, type: fake.source, use: bypassed }
+  - { id: b, type: fake.add, in: { volume: a.volume } }
+  - { id: c, type: fake.sum, in: { a: b.volume, b: a.volume } }
+)");
+    EXPECT_EQ(problems_of(plan),
+              "g.yaml:3:11: node 'a': it cannot be bypassed: nothing that is wired to it could stand for its output "
+              "'volume' (Volume), asked for by 'b'; disable it instead\n");
+    EXPECT_FALSE(plan.nodes[std::size_t(plan.find("c"))].ok);
+    plan = check_text(R"(voxloom: 1
+nodes:
+  - { id: a, type: fake.add, use: bypassed, in: { volume: b.volume } }
+  - { id: b, type: fake.add, use: bypassed, in: { volume: a.volume } }
+  - { id: c, type: fake.table, in: { source: a.volume } }
+  - { id: d, type: fake.unheard-of, use: bypassed, in: { volume: c.volume } }
+  - { id: e, type: fake.add, in: { volume: d.volume } }
+)");
+    EXPECT_THAT(problems_of(plan), HasSubstr("cannot be bypassed")) << "they pass on nothing but each other";
+    EXPECT_THAT(problems_of(plan), HasSubstr("unknown node type"));
+    EXPECT_FALSE(plan.nodes[std::size_t(plan.find("e"))].ok);
+    EXPECT_THAT(problems_of(check_text("voxloom: 1\noutputs: [a.volume]\nnodes: [{ id: a, type: fake.source, use: bypassed }]\n")),
+                HasSubstr("asked for by the graph's outputs"));
+}
+
+TEST(Check, DisabledNodesTakeAwayWhatNeedsThem) {
+    const Plan plan = check_text(R"(voxloom: 1
+nodes:
+  - { id: off, type: fake.unheard-of, use: disabled, in: { x: nobody.y } }
+  - { id: needs, type: fake.add, in: { volume: off.volume } }
+  - { id: after, type: fake.table, in: { source: needs.volume } }
+  - { id: a, type: fake.source }
+  - { id: no, type: fake.source, use: disabled, set: { size: nonsense } }
+  - { id: both, type: fake.sum, in: { a: a.volume, b: no.volume } }
+  - { id: many, type: fake.gather, in: { volumes: [a.volume, no.volume, needs.volume] } }
+  - { id: none, type: fake.gather, in: { volumes: [no.volume] } }
+)");
+    EXPECT_EQ(problems_of(plan), "");
+    EXPECT_EQ(wiring_of(plan), "both(a:0) many(a:0)");
+    auto off = [&](const char* id) { return plan.nodes[std::size_t(plan.find(id))].off; };
+    EXPECT_EQ(off("off"), "it is disabled");
+    EXPECT_EQ(off("needs"), "it needs 'off', which is disabled");
+    EXPECT_EQ(off("after"), "it needs 'off', which is disabled");
+    EXPECT_EQ(off("none"), "it needs 'no', which is disabled");
+    EXPECT_THAT(plan.warnings, ::testing::Contains(HasSubstr("'after' is left out: it needs 'off', which is disabled")));
+    EXPECT_THAT(plan.warnings, ::testing::Contains(HasSubstr("'both' runs without 'no'")));
+    EXPECT_THAT(problems_of(check_text("voxloom: 1\nnodes: [{ id: a, type: fake.source, use: disabled }]\n")),
+                HasSubstr("nothing to run"));
+}
+
 TEST(Check, TakesListsWhereAPortTakesMany) {
     Plan plan = check_text(R"(voxloom: 1
 nodes:

@@ -145,9 +145,9 @@ nodes:
     EXPECT_EQ(
         all,
         "g.yaml:2:1: unknown key 'ouputs'; did you mean 'outputs'?; a graph has: voxloom, outputs, "
-        "nodes\n"
-        "g.yaml:6:5: node 'a': unknown key 'sett'; did you mean 'set'?; a node has: id, type, in, "
-        "set, at\n"
+        "nodes, editor\n"
+        "g.yaml:6:5: node 'a': unknown key 'sett'; did you mean 'set'?; a node has: id, type, use, "
+        "in, set, at\n"
         "g.yaml:7:25: node 'a': input 'source' is 'd.e.f'; write node.port\n"
         "g.yaml:8:9: node 'a': 'at' must be two numbers, such as [640, 120]\n"
         "g.yaml:9:5: this node has no 'id'; give it a name\n"
@@ -444,6 +444,54 @@ TEST(DocumentEdit, WorksOnEveryLayout) {
     EXPECT_EQ(after("voxloom: 1\nnodes: [{ id: a, type: t, set: {\n  x: 1, # keep\n  y: 2 } }]\n",
                     [](Document& d) { d.reset_param("a", "y"); }),
               "voxloom: 1\nnodes: [{ id: a, type: t, set: {\n  x: 1, # keep\n   } }]\n");
+}
+
+TEST(DocumentEdit, KeepsWhetherANodeIsUsed) {
+    constexpr const char* text = "voxloom: 1\nnodes:\n  - id: a  # first\n    type: t\n    set: { x: 1 }\n  - { id: b, type: t }\n";
+    Document document = Document::parse(text);
+    document.set_use({"a", "b"}, GraphNode::Use::bypassed);
+    EXPECT_EQ(document.text(),
+              "voxloom: 1\nnodes:\n  - id: a  # first\n    type: t\n    use: bypassed\n    set: { x: 1 }\n"
+              "  - { id: b, type: t, use: bypassed }\n");
+    document.set_use({"b"}, GraphNode::Use::disabled);
+    EXPECT_EQ(Document::parse(document.text()).graph().nodes[1].use, GraphNode::Use::disabled);
+    document.set_use({"a", "b"}, GraphNode::Use::normal);
+    EXPECT_EQ(document.text(), text);
+    document.undo();
+    document.undo();
+    document.undo();
+    EXPECT_EQ(document.text(), text);
+    EXPECT_THAT(refusal_of("voxloom: 1\nnodes: [{ id: a, type: t, use: never }]\n"), HasSubstr("'use' is 'never'; write bypassed"));
+    EXPECT_THAT(refusal_of("voxloom: 1\nnodes: [{ id: a, type: t, use: [] }]\n"), HasSubstr("'use' is a list"));
+}
+
+TEST(DocumentEdit, KeepsWhatIsTheEditorsOwn) {
+    constexpr const char* text = "editor: { zoom: 2, comments: [['an odd: one', 1, 2]] }  # mine\nvoxloom: 1\nnodes: []\n";
+    Document document = Document::parse(text);
+    ASSERT_EQ(document.graph().editor.size(), 2u);
+    document.add_node("a", "t");
+    EXPECT_EQ(document.graph().editor[1].yaml.items[0].items[0].text, "an odd: one");
+    GraphParam::Yaml list{GraphParam::Yaml::Kind::list, {}, {}, {}};
+    document.set_editor("comments", list);
+    EXPECT_THAT(document.text(), ::testing::StartsWith("editor: { zoom: 2 }  # mine\n"));
+    GraphParam::Yaml item{GraphParam::Yaml::Kind::quoted, "two\nlines", {}, {}};
+    list.items = {item};
+    document.set_editor("groups", list);
+    document.set_editor("zoom", list);
+    EXPECT_EQ(Document::parse(document.text()).graph().editor[1].yaml.items[0].text, "two\nlines");
+    EXPECT_EQ(Document::parse(document.text()).graph().editor[0].key, "zoom") << "a key keeps its place";
+    for (int i = 0; i < 4; ++i) document.undo();
+    EXPECT_EQ(document.text(), text);
+    // A new one goes to the end, whatever stands there.
+    for (const char* other : {"voxloom: 1\nnodes:\n  - id: a\n    type: t\n", "{ voxloom: 1, nodes: [] }", "nodes: []\nvoxloom: 1"}) {
+        Document added = Document::parse(other);
+        added.set_editor("groups", list);
+        EXPECT_EQ(Document::parse(added.text()).graph().editor.at(0).key, "groups") << added.text();
+        added.set_editor("groups", {GraphParam::Yaml::Kind::list, {}, {}, {}});
+        EXPECT_TRUE(added.graph().editor.empty());
+        EXPECT_EQ(added.graph().nodes.size(), Document::parse(other).graph().nodes.size());
+    }
+    EXPECT_THAT(refusal_of("voxloom: 1\neditor: 7\n"), HasSubstr("'editor' is a single value"));
 }
 
 TEST(DocumentEdit, BreaksLinesThatWouldGrowTooLong) {
