@@ -1,9 +1,12 @@
-// Decoded bricks on the GPU: one 3-D texture cut into slots, one brick each.
+// Decoded bricks on the GPU: one 3-D texture, and a second and third one like it for gradients and colours.
 //
-// A slot holds a brick with an apron of its neighbours' voxels, so that it is interpolated without a look
-// at another one; neighbours of one level therefore agree on the face that they share. Bricks stay from
-// picture to picture, least recently used out first; those of the running picture stay in any case. Used
-// on the OpenGL thread alone; voxels are decoded and converted on all threads.
+// Levels that fit lie in it as they are, each as one grid of voxels of which only the bricks that were asked
+// for are there: bricks that lie side by side in space do so in the texture, and a ray goes from one to
+// the next without noticing. Larger ones are cut into slots, one brick each with an apron of its neighbours'
+// voxels, so that it is interpolated without a look at another one; neighbours of one level therefore agree
+// on the face that they share. Bricks stay from picture to picture; where slots are short the least recently
+// used go first, but none of the running picture. Used on the OpenGL thread alone; voxels are decoded and
+// converted on all threads.
 #pragma once
 
 #include <list>
@@ -12,17 +15,44 @@
 #include <vector>
 
 #include "core/data/brick_cache.h"
+#include "core/data/transfer_function.h"
 #include "core/gpu/source.h"
 
 namespace voxloom::slicer {
 
+// What is kept of a voxel.
+struct Texels {
+    gpu::TexelLayout layout;               // of its value
+    std::optional<double> gradient_side;   // a gradient too, smoothed so; see Gradients
+    float gradient_scale = 1;              // of its unit, per step of the brick's level
+    TransferPtr transfer;                  // colour and optical depth too, where not null ...
+    double slab = 1;                       // ... of a slab so thick
+    std::uint64_t bytes() const { return layout.bytes() + (gradient_side ? 8 : 0) + (transfer ? 16 : 0); }
+};
+
+// Where in the texture bricks go.
+struct Places {
+    glm::ivec3 dims{0};                    // of the texture
+    std::int64_t slots = 0;                // bricks that have room at once
+    glm::ivec3 grid{0};                    // of slots; 0: whole levels
+    int first_level = 0;                   // whole levels: the finest that is there ...
+    std::vector<glm::ivec3> origin;        // ... and where each level begins, with its apron
+    bool whole() const { return !origin.empty(); }
+
+    // All levels from the finest on that `bytes` have room for with all coarser ones. Empty where not even
+    // the coarsest fits.
+    static std::optional<Places> whole_levels(const BricksDesc& bricks, Apron apron, std::uint64_t texel_bytes,
+                                              std::uint64_t bytes);
+    // Slots for `wanted` bricks, fewer where one texture cannot hold as many.
+    static Places in_slots(const BricksDesc& bricks, Apron apron, std::int64_t wanted);
+};
+
 class Atlas {
   public:
-    // `slots` bricks at most, fewer where one texture cannot hold as many. Throws Error where the driver
-    // has no room.
-    Atlas(const BricksDesc& bricks, const gpu::TexelLayout& layout, Apron apron, std::int64_t slots);
+    // Throws Error where the driver has no room.
+    Atlas(const BricksPtr& bricks, const Texels& texels, Apron apron, const Places& places);
     // Bytes of one slot, for budgets.
-    static std::uint64_t slot_bytes(const BricksDesc& bricks, const gpu::TexelLayout& layout, Apron apron);
+    static std::uint64_t slot_bytes(const BricksDesc& bricks, Apron apron, std::uint64_t texel_bytes);
 
     struct Counters {
         std::uint64_t hits = 0, uploaded = 0, bytes = 0, evicted = 0;
@@ -33,13 +63,17 @@ class Atlas {
     Counters load(const BricksPtr& bricks, const std::vector<BrickId>& wanted, const std::stop_token& stop,
                   const std::function<void(double)>& progress);
 
-    std::int64_t slots() const { return slots_; }
-    const gpu::TexturePtr& texture() const { return texture_; }
-    std::uint64_t bytes() const { return texture_->bytes; }
-    const gpu::TexelLayout& layout() const { return layout_; }
+    std::int64_t slots() const { return places_.slots; }
+    const Places& places() const { return places_; }
+    const gpu::TexturePtr& values() const { return values_; }
+    const gpu::TexturePtr& gradients() const { return gradients_; }  // RGBA16_SNORM, null where not kept
+    const gpu::TexturePtr& colours() const { return colours_; }      // RGBA32F, null where not kept
+    std::uint64_t bytes() const;
+    const Texels& texels() const { return texels_; }
     Apron apron() const { return apron_; }
 
-    // Of a brick that the last load() was asked for: the texel of its first own voxel.
+    // Of a brick that the last load() was asked for: the texel of its first own voxel. Of whole levels: of
+    // any brick, whose values lie within its info().range where it was never asked for.
     glm::ivec3 texel_of(BrickId id) const;
     // Smallest and largest value within `kReach` voxels of the brick's cells [lo, hi), in voxels from its
     // first; lo > hi where nothing is valid.
@@ -52,23 +86,26 @@ class Atlas {
   private:
     struct Brick {
         BrickId id;
-        std::int64_t slot;
-        std::uint64_t picture;           // that wanted it last
+        std::int64_t slot = 0;
+        std::uint64_t picture = 0;       // that wanted it last
         std::vector<glm::vec2> ranges;   // of its blocks, x fastest
     };
     using Place = std::list<Brick>::iterator;
-    glm::ivec3 corner_of(std::int64_t slot) const;
-    void fill(const BricksPtr& bricks, Brick& brick, std::span<std::byte> texels, bool& invalid,
+    struct Staging;
+    glm::ivec3 corner_of(const Brick& brick) const;
+    void begin_level(const Bricks& bricks, int level);
+    void fill(const BricksPtr& bricks, Brick& brick, Staging& staging, std::size_t at, bool& invalid,
               const std::stop_token& stop) const;
 
-    gpu::TexelLayout layout_;
+    Texels texels_;
     Apron apron_;
-    glm::ivec3 brick_, side_, grid_{0}, block_, blocks_;
-    std::int64_t slots_ = 0;
-    gpu::TexturePtr texture_;
+    Places places_;
+    glm::ivec3 brick_, side_, block_, blocks_;
+    gpu::TexturePtr values_, gradients_, colours_;
     std::list<Brick> order_;             // most recently used first
     std::unordered_map<BrickId, Place, HashOfBrickId> index_;
     std::vector<std::int64_t> free_;
+    std::vector<bool> begun_;            // whole levels
     std::uint64_t picture_ = 0;
 };
 

@@ -3,13 +3,13 @@
 // Space is a grid of cells, each as large as the smallest thing drawn: a brick, or an octant of one that
 // finer bricks have replaced in part. A cell names a page, the brick or the octant that it lies in, or
 // none; a page says where its brick lies in the atlas, what it blends into, and how far apart its slices
-// are. So a ray walks from page to page, and a fragment draws all of them.
+// are. So a ray walks from page to page, and a fragment draws all of them. Bricks of one level that lie side
+// by side in the atlas are one page; where that is all there is, it is drawn as a volume is.
 #pragma once
 
 #include "core/data/selection.h"
 #include "core/gpu/source.h"
 #include "plugins/render-slicer/atlas.h"
-#include "plugins/render-slicer/view.h"
 
 namespace voxloom {
 class Evaluation;
@@ -18,18 +18,21 @@ class Evaluation;
 namespace voxloom::slicer {
 
 struct BrickScene {
-    std::shared_ptr<const gpu::FieldSource> field;  // fetch_voxel and sample_linear with the prefix brick_
+    std::shared_ptr<const gpu::FieldSource> field;  // source-bricks, or source-level where it is one level
+    std::shared_ptr<const Atlas> atlas;
     ValueRange range;                // of every value that any brick can hold
     gpu::TexturePtr occupancy;       // as for a dense volume; null: nothing is seen
     glm::vec3 block_size{1.0f};      // index coordinates
     glm::ivec3 blocks{0};
     std::size_t seen = 0;            // blocks
+    bool one_level = false;          // one page is all there is
     glm::vec3 cell_size{1.0f};       // index coordinates
     glm::ivec3 cells{0};
-    glm::vec3 brick_size{1.0f};      // voxels of a brick
-    glm::vec3 slot_lo{0.0f}, slot_hi{0.0f};  // of a brick's voxels in its slot, from its first own one
+    glm::vec3 slot_at{0.0f}, slot_lo{0.0f}, slot_hi{0.0f}, scale{1.0f};  // of the one page; slot_lo: of all
+    glm::vec3 brick_size{1.0f}, brick_hi{0.0f};  // voxels of a brick; the last one of them in its slot
     bool blended = false;            // some page mixes in its parent
-    int steps = 1;                   // slices of pages are 1, 2, ... 2^(steps-1) planes apart
+    int steps = 1;                   // slices of pages are 1, 2, ... 2^(steps-1) planes apart; of one level:
+    int step = 1;                    // so many
 
     void set(const gpu::Program& program) const;
 };
@@ -37,8 +40,13 @@ struct BrickScene {
 struct BrickRequest {
     int component = 0;
     Apron apron;
+    std::optional<double> gradient_side;  // gradients are stored
+    TransferPtr transfer;                 // not null: colours are, of slabs so thick
+    double slab = 1;
     // Whether anything with values between lo and hi is seen, where none is below `least`.
     std::function<bool(double least, double lo, double hi)> visible;
+    // Whether rays may come to a box of voxels of level 0. Null: pages are not joined, each is a brick.
+    std::function<bool(const Box&)> in_view;
     std::uint64_t gpu_bytes = 0;     // that the atlas may take
 };
 

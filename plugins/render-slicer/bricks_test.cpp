@@ -207,32 +207,101 @@ TEST(BrickPath, EveryBrickAtTheFinestLevelIsTheVolume) {
         }
 }
 
-// The volume and all of its bricks, drawn alike.
-static void expect_same_picture(const std::string& mode) {
-    const VolumePtr volume = blob({37, 50, 41});
-    const BricksPtr bricks = pyramid(volume, 16);
+// The volume and all of its bricks, drawn alike: the level as a whole in the texture, or, with so little
+// memory that this is not possible, in slots.
+static void expect_same_picture(const std::string& mode, int slots_memory, Index3 dims = {64, 64, 72}, int brick = 16) {
+    const VolumePtr volume = blob(dims);
+    const BricksPtr bricks = pyramid(volume, brick);
     const Camera camera = looking({1, 0.6, 0.4}, volume->desc(), kPerspective);
-    const ImagePtr a = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, mode).image();
     const ImagePtr b = draw(volume, nullptr, smooth(240), camera, mode).image();
     EXPECT_GT(brightest(*b), 0.04) << mode;
-    // A pixel at the rim of a surface, or on the border between two voxels, may fall on either side.
-    double sum = 0;
-    for (std::size_t i = 0; i < a->rgba32f().size(); ++i) {
-        const glm::vec4 d = a->rgba32f()[i] - b->rgba32f()[i];
-        sum += glm::dot(d, d);
+    for (int memory : {2048, slots_memory}) {
+        NodeRun run = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, mode + ", gpu_memory: " + std::to_string(memory));
+        if (memory == 2048)
+            EXPECT_EQ(run.counters["pages drawn"], 1) << mode;
+        else
+            EXPECT_EQ(run.counters["pages drawn"], run.counters["bricks drawn"]) << mode;
+        const ImagePtr a = run.image();
+        // A pixel at the rim of a surface, or on the border between two voxels, may fall on either side.
+        double sum = 0;
+        for (std::size_t i = 0; i < a->rgba32f().size(); ++i) {
+            const glm::vec4 d = a->rgba32f()[i] - b->rgba32f()[i];
+            sum += glm::dot(d, d);
+        }
+        EXPECT_LT(std::sqrt(sum / double(4 * a->rgba32f().size())), memory == 2048 ? 1e-3 : 4e-3) << mode << " " << memory;
     }
-    EXPECT_LT(std::sqrt(sum / double(4 * a->rgba32f().size())), 4e-3) << mode;
 }
 
 TEST(BrickPath, EveryCompositingAndReconstructionDrawsWhatTheVolumeShows) {
     for (const char* mode : {", compositing: mip", ", compositing: x-ray", ", compositing: isosurface, iso_value: 150",
-                             ", reconstruction: nearest", ", reconstruction: tricubic", ", classification: post"})
-        expect_same_picture(mode);
+                             ", reconstruction: nearest", ", classification: post"})
+        expect_same_picture(mode, 1);
+    expect_same_picture(", reconstruction: tricubic", 2, {64, 96, 96}, 32);  // its slots are larger
 }
+
+TEST(BrickPath, ClassifiedVoxelsDrawWhatTheVolumeShows) { expect_same_picture(", classification: pre", 9); }
 
 TEST(BrickPath, ShadingDrawsWhatTheVolumeShows) {
     for (const char* mode : {"", ", compositing: mip", ", compositing: isosurface, iso_value: 150"})
-        expect_same_picture(std::string(", shading: true, gradient: central, gradient_source: on-the-fly") + mode);
+        expect_same_picture(std::string(", shading: true, gradient: central, gradient_source: on-the-fly") + mode, 2, {64, 96, 96}, 32);
+}
+
+TEST(BrickPath, StoredGradientsDrawWhatTheVolumeShows) {
+    for (const char* mode : {"", ", compositing: mip", ", compositing: isosurface, iso_value: 150", ", gradient_modulation: [0, 3]"})
+        expect_same_picture(std::string(", shading: true") + mode, 5);
+}
+
+TEST(BrickPath, ALevelAloneIsDrawnAsAVolumeOfItsOwn) {
+    // Of either level's voxels, with its own slices: the level as a volume is the same picture.
+    const BricksPtr bricks = pyramid(blob({97, 81, 70}, ScalarType::u16, {1, 1, 2}), 16);
+    for (int level : {1, 2}) {
+        const VolumePtr alone = level_as_volume(bricks, level, BrickCache::global());
+        for (const char* mode : {"", ", shading: true", ", shading: true, gradient_source: on-the-fly", ", classification: pre"}) {
+            // The slices of a volume are anchored at its middle, which is not the same here: so thin that it does not show.
+            const Camera camera = looking({1, 0.5, -0.4}, alone->desc(), kPerspective);
+            const std::string fine = std::string(", slice_distance: 0.1") + mode;
+            const ImagePtr a = draw(bricks, level_of(bricks->desc(), level), smooth(240, 0.02), camera, fine).image();
+            const ImagePtr b = draw(alone, nullptr, smooth(240, 0.02), camera, fine).image();
+            EXPECT_GT(brightest(*b), 0.3);
+            double sum = 0;
+            for (int y = 12; y < 28; ++y)
+                for (int x = 14; x < 34; ++x) sum += glm::distance(a->at(x, y), b->at(x, y)) / (16 * 20);
+            EXPECT_LT(sum, 0.02) << level << mode;
+        }
+    }
+}
+
+TEST(BrickPath, MixedLevelsAreShadedAndClassifiedAlikeStoredOrNot) {
+    const BricksPtr bricks = pyramid(blob({64, 64, 64}, ScalarType::u16), 16);
+    const Camera camera = looking({1, 0.6, 0.4}, bricks->desc().volume, kPerspective);
+    for (const SelectionPtr& s : {SelectionPtr(two_levels(bricks->desc(), 5, true)), SelectionPtr(nested(bricks->desc(), 3))}) {
+        const ImagePtr stored = draw(bricks, s, smooth(240), camera, ", shading: true, gradient: central").image();
+        const ImagePtr computed =
+            draw(bricks, s, smooth(240), camera, ", shading: true, gradient: central, gradient_source: on-the-fly").image();
+        double sum = 0;
+        for (std::size_t i = 0; i < stored->rgba32f().size(); ++i) sum += glm::distance(stored->rgba32f()[i], computed->rgba32f()[i]) / (48 * 40);
+        EXPECT_LT(sum, 2e-3);  // only where levels meet is a gradient of what is mixed another than a mixed gradient
+        // Extinction and colour that are linear in the value may be interpolated before or after.
+        const ImagePtr pre = draw(bricks, s, smooth(65535), camera, ", classification: pre").image();
+        const ImagePtr post = draw(bricks, s, smooth(65535), camera, ", classification: post").image();
+        EXPECT_LT(largest_difference(*pre, *post), 2e-4);
+    }
+}
+
+TEST(BrickPath, WhatIsMissingAndCannotBeSeenIsStillNotSeen) {
+    // Seen values in the middle of the range: between what is there and what is not, interpolation crosses
+    // them wherever something other than the brick's own values stands in.
+    const VolumePtr volume = make_volume({64, 64, 64}, ScalarType::u8, [](auto x, auto y, auto z) {
+        return x >= 16 && x < 48 && y >= 16 && y < 40 && z >= 16 ? (x + y + z) % 3 ? 120.0 : 20.0 : x < 32 ? 10.0 : 240.0;
+    });
+    const BricksPtr bricks = pyramid(volume, 16);
+    const TransferPtr tf = transfer({{{60, Emission(0)}, {100, Emission(0.1)}, {140, Emission(0.1)}, {200, Emission(0)}}});
+    for (glm::dvec3 from : kViews)
+        for (const char* mode : {"", ", skipping: false", ", slice_distance: 5", ", classification: pre", ", compositing: x-ray"}) {
+            NodeRun run = draw(bricks, level_of(bricks->desc(), 0), tf, looking(from, volume->desc(), kPerspective), mode);
+            EXPECT_GT(run.counters["bricks skipped (transparent)"], 5);
+            EXPECT_LT(largest_difference(*run.image(), *draw(volume, nullptr, tf, looking(from, volume->desc(), kPerspective), mode).image()), 2e-4) << mode;
+        }
 }
 
 TEST(BrickPath, SkippingChangesNothing) {

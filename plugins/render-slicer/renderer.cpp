@@ -195,21 +195,28 @@ void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner
 
 // Voxels of neighbours around a brick, so that its own are enough for what is drawn.
 Apron apron_for(const Scene& scene) {
-    const bool wide = uses_gradient(scene) || scene.settings.reconstruction == S::Reconstruction::tricubic;
-    return wide ? Apron{1, 2} : Apron{0, 1};
+    const bool stencil = uses_gradient(scene) && !scene.settings.gradient_stored;
+    const int wider = stencil + (scene.settings.reconstruction == S::Reconstruction::tricubic);
+    return {wider, wider + 1};
+}
+
+bool is_classified_before(const Scene& scene) {
+    return scene.settings.classification == S::Classification::pre && is_slabs(scene.settings) && !scene.transfer->two;
 }
 
 // Bricks in place of a volume.
-void prepare_bricks(const Scene& scene, Evaluation& ev, Prepared& p) {
+void prepare_bricks(const Scene& scene, const View& view, Evaluation& ev, Prepared& p) {
     const S& s = scene.settings;
     const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
-    if (s.classification == S::Classification::pre && is_slabs(s) && !scene.transfer->two)
-        fail("bricks are not classified before they are interpolated; choose classification post or pre-integrated, "
-             "or draw a decoded volume");
     BrickRequest request;
     request.component = s.component;
     request.apron = apron_for(scene);
     request.gpu_bytes = s.gpu_bytes;
+    if (uses_gradient(scene) && s.gradient_stored) request.gradient_side = smoothing_side(s.gradient);
+    if (is_classified_before(scene)) {
+        request.transfer = scene.transfer;
+        request.slab = view.plane_distance;
+    }
     request.visible = [&](double least, double lo, double hi) {
         if (cubic && lo < hi) {
             const double middle = 0.5 * lo + 0.5 * hi, half = kCubicOvershoot * (0.5 * hi - 0.5 * lo);
@@ -218,6 +225,7 @@ void prepare_bricks(const Scene& scene, Evaluation& ev, Prepared& p) {
         }
         return is_visible(scene, least, lo, hi);
     };
+    request.in_view = [&](const Box& box) { return view.may_meet(box); };
     p.bricks = slicer::prepare_bricks(std::get<BricksPtr>(scene.source), scene.selection.get(), request, ev);
     p.field = p.bricks->field;
     p.range = p.bricks->range;
@@ -225,6 +233,11 @@ void prepare_bricks(const Scene& scene, Evaluation& ev, Prepared& p) {
     p.seen = p.bricks->seen;
     p.block_size = p.bricks->block_size;
     p.block_grid = p.bricks->blocks;
+    if (!p.bricks->field) return;
+    if (request.gradient_side)
+        p.gradient = std::make_shared<Prepared::Stored>(
+            Prepared::Stored{p.bricks->atlas->gradients(), p.bricks->atlas->texels().gradient_scale});
+    if (request.transfer) p.classified = p.bricks->atlas->colours();
 }
 
 void prepare_volume(const Scene& scene, const View& view, const std::shared_ptr<const void>& owner,
@@ -263,17 +276,19 @@ void prepare_volume(const Scene& scene, const View& view, const std::shared_ptr<
         });
 }
 
-Prepared prepare(const Scene& scene, const View& view, const VolumeDesc& desc, bool as_bricks,
+// `view` gets the slices of the level where only one is drawn.
+Prepared prepare(const Scene& scene, View& view, const VolumeDesc& desc, bool as_bricks,
                  const std::shared_ptr<const void>& owner, Evaluation& ev) {
     const S& s = scene.settings;
     const TransferFunction& tf = *scene.transfer;
     Keep& keep = Keep::instance();
     Prepared p;
     if (as_bricks)
-        prepare_bricks(scene, ev, p);
+        prepare_bricks(scene, view, ev, p);
     else
         prepare_volume(scene, view, owner, ev, p);
     if (p.seen == 0) return p;
+    if (p.bricks) view.widen_slices(p.bricks->step);
     const glm::ivec3 dims(desc.dims);
     const gpu::VoxelSource& voxels = p.field->voxels;
     if (p.range.min == p.range.max) {
@@ -322,8 +337,8 @@ Prepared prepare(const Scene& scene, const View& view, const VolumeDesc& desc, b
         p.emission_2d = keep_table(scene.transfer, key("2d", tables, key("", thickness)), ev,
                                    GL_TEXTURE_2D, size,
                                    [&] { return emission_table_2d(*tf.two, thickness); });
-    } else if (slabs && s.classification == S::Classification::pre) {
-        p.classified = keep.get<KeptTexture>(
+    } else if (is_classified_before(scene)) {
+        if (!p.classified) p.classified = keep.get<KeptTexture>(
             owner, key("classified", hash_of(tf), key("", d, s.component)), [&](std::uint64_t& bytes) {
                 ev.progress(0.7, "classifying the voxels");
                 auto t = gpu::upload_computed(
@@ -423,14 +438,19 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
     choose(shading, "SHADING");
     choose(modulation, "MODULATION");
     choose(lighting.at_eye, "EYE_LIGHT");
-    choose(p.bricks && p.bricks->blended, "BLENDED");
-    choose(p.bricks && p.bricks->steps > 1, "STEPS");
-    choose(p.bricks && p.bricks->steps > 1 && p.slabs, "LEVEL_TABLES");
-    // Planes to the next slice, index steps to the next voxel, the way to a plane's voxels.
-    choices += p.bricks ? "#define PLANE_STEP page_step\n#define VOXEL_STEP (1.0 / page_scale)\n"
-                          "#define VISIT(m) open_page(ray_at(m))\n#define MARCH march_bricks\n"
-                        : "#define PLANE_STEP 1.0\n#define VOXEL_STEP vec3(1.0)\n#define VISIT(m)\n"
-                          "#define MARCH march\n";
+    const bool paged = p.bricks && !p.bricks->one_level;
+    choose(paged && p.bricks->blended, "BLENDED");
+    choose(paged && p.bricks->steps > 1, "STEPS");
+    choose(paged && p.bricks->steps > 1 && p.slabs, "LEVEL_TABLES");
+    // Planes to the next slice and of how many of the finest level's slabs one is, index steps to the next
+    // voxel, the way to a plane's voxels.
+    choices += fmt::format("#define PLANE_STEP {}\n#define SLAB_STEP {}\n#define VOXEL_STEP {}\n#define VISIT(m) {}\n#define MARCH {}\n",
+                           paged ? "page_step" : "1.0",
+                           fmt::format("{:.1f}", p.bricks && !paged ? p.bricks->step : 1.0),
+                           p.bricks ? "(1.0 / page_scale)" : "vec3(1.0)", paged ? "open_page(ray_at(m))" : "",
+                           paged ? "march_bricks" : "march");
+    choices += fmt::format("#define GRADIENT_AT {0}\n#define CLASSIFIED_AT {1}\n", p.bricks ? "gradient_at" : "gradient_reconstruct",
+                           p.bricks ? "classified_at" : "classified_reconstruct");
     choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", lighting.place.size(),
                            smoothing_side(s.gradient));
 
@@ -438,21 +458,23 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
                              "reconstruction-tricubic"};
     const Module kernel = module(kernels[int(s.reconstruction)]);
     std::vector<Module> parts = {{"choices", choices}, module("ray"), voxels.glsl};
+    // What else is known of the voxels, in a texture like theirs.
+    auto texture_of = [&](const std::string& prefix) {
+        parts.push_back(over(p.bricks ? module("texels-in-slots") : gpu::dense_module(), prefix));
+        parts.push_back(over(kernel, prefix));
+        if (p.bricks) parts.push_back(with(module("at-point"), "TEXELS", prefix));
+    };
     if (p.bricks) {
-        parts.push_back(over(kernel, "brick"));
+        texture_of("brick");
         parts.push_back(module("reconstruction-bricks"));
     } else if (!p.field->own_kernels) {
         if (!voxels.linear) parts.push_back(module("linear-from-voxels"));
         parts.push_back(kernel);
     }
     parts.push_back(module("scalar"));
-    auto second_texture = [&](const std::string& prefix) {
-        parts.push_back(over(gpu::dense_module(), prefix));
-        parts.push_back(over(kernel, prefix));
-    };
     if (gradient) {
         if (p.gradient) {
-            second_texture("gradient");
+            texture_of("gradient");
             parts.push_back(module("gradient-stored"));
         } else if (!p.field->own_kernels) {
             parts.push_back(module(s.gradient == S::Gradient::central ? "gradient-central"
@@ -471,7 +493,7 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
         parts.push_back(module(s.compositing == S::Compositing::mip ? "march-mip" : "march-isosurface"));
     } else {
         if (p.classified) {
-            second_texture("classified");
+            texture_of("classified");
             parts.push_back(module("classification-pre"));
         } else {
             parts.push_back(module(p.slabs ? "classification-pre-integrated" : "classification-post"));
@@ -480,7 +502,7 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
                                                                      : "compositing-x-ray"));
         parts.push_back(module(shading || modulation ? "march-slabs-late" : "march-slabs"));
     }
-    if (p.bricks) parts.push_back(module("march-bricks"));
+    if (paged) parts.push_back(module("march-bricks"));
     parts.push_back(module("view-aligned"));
     return gpu::program({module("proxy-screen")}, parts);
 }
@@ -497,6 +519,7 @@ void set_uniforms(const gpu::Program& program, const Scene& scene, const View& v
     const glm::vec3 inverse = 1.0f / glm::vec3(desc.dims);
     const glm::ivec3 last(desc.dims - Index3(1));
     for (const char* prefix : {"", "gradient_", "classified_"}) {
+        if (p.bricks) break;
         program.set((std::string(prefix) + "dense_inverse_dims").c_str(), inverse);
         program.set((std::string(prefix) + "dense_last").c_str(), last);
     }
@@ -671,10 +694,12 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
                             "instead", s.slice_distance, view.planes, coarser));
         view = View(*scene.camera, desc, s.size, coarser);
     }
-    ev.count("slices", std::ceil(view.planes));
     if (as_bricks) view.limit_reach(Atlas::kReach - (s.reconstruction == S::Reconstruction::tricubic));
 
+    const std::int64_t start = wall_ns();
     Prepared prepared = prepare(scene, view, desc, as_bricks, owner, ev);
+    ev.count("prepare ms", double(wall_ns() - start) * 1e-6);
+    ev.count("slices", std::ceil(view.planes));
     if (prepared.seen == 0) {
         Keep::instance().shrink(s.gpu_bytes);
         return only_background(s);

@@ -153,11 +153,12 @@ A fragment marches all slabs of its ray, so that the accumulated colour never le
 that the transfer function leaves transparent are leapt over (a chessboard distance field tells how far),
 and a ray ends where it is saturated.
 
-Of bricks with a selection only what is selected is decoded and uploaded: into the slots of one texture, where
-bricks stay from picture to picture, least recently used out first. A ray goes from brick to brick, with the
-slices and the table of each one's level; slabs are cut at the faces between bricks, so what a ray meets does
-not depend on how the volume is cut. Where `lod.balance` says so a brick blends into its coarser neighbours.
-Gradients are computed on the fly there, and `gpu_memory` must hold the bricks of one picture.
+Of bricks with a selection only what is selected is decoded and uploaded, and stays from picture to picture.
+Where three quarters of `gpu_memory` have room for whole levels, bricks lie in one texture as they do in space,
+and what is drawn of one level alone is drawn as a volume is. Else they lie in slots, least recently used out
+first, and `gpu_memory` must hold the bricks of one picture. Between levels a ray goes from brick to brick, with
+the slices and the table of each one's level; slabs are cut at the faces, so what a ray meets does not depend on
+how the volume is cut. Where `lod.balance` says so a brick blends into its coarser neighbours.
 
 **When to use.** For looking at volumes, from 8-bit scans to floats, at any quality: `slice_distance` trades
 time for error, 2 for a quick look, 0.5 for a still.

@@ -62,6 +62,17 @@ View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 pixels, doub
         slope = {-0.5 * size.x * pixel, pixel, 0.5 * size.y * pixel, -pixel};
     near_plane = (std::max(camera.near, 0.0) - depth) / plane_distance;
 
+    // A few pixels more on each side, for squares that the picture's border cuts.
+    const glm::dvec2 half = (0.5 * glm::dvec2(size) + 8.0) * pixel;
+    auto coordinate = [&](glm::dvec3 axis) {  // along a world axis, from the eye
+        const glm::dvec3 n = glm::transpose(to_world) * axis;
+        return glm::dvec4(n, -glm::dot(n, middle) - glm::dot(axis, from_middle));
+    };
+    const glm::dvec4 right = coordinate(r), above = coordinate(u), away_of = coordinate(f);
+    const glm::dvec4 depth_of = perspective ? away_of : glm::dvec4(0, 0, 0, 1);
+    outside_ = {right - half.x * depth_of, -right - half.x * depth_of, above - half.y * depth_of, -above - half.y * depth_of,
+                glm::dvec4(0, 0, 0, std::max(camera.near, 0.0)) - away_of};
+
     // The picture of the box is inside of that of its corners; all of it where one is behind the eye.
     glm::dvec2 lo(size), hi(0);
     for (int corner = 0; corner < 8; ++corner) {
@@ -101,6 +112,23 @@ View::View(const Camera& camera, const VolumeDesc& desc, glm::ivec2 pixels, doub
     index_to_place = to_world / diagonal;
     gradient_to_world = smallest_spacing * glm::transpose(to_index);
     eye_place = perspective ? glm::dvec4(from_middle / diagonal, 1.0) : glm::dvec4(-f, 0.0);
+}
+
+void View::widen_slices(int times) {
+    plane_distance *= times;
+    planes /= times;
+    near_plane /= times;
+    step_0 *= double(times);
+    step_x *= double(times);
+    step_y *= double(times);
+}
+
+bool View::may_meet(const Box& b) const {
+    // Up to the first voxel behind it.
+    const glm::dvec3 middle_of = 0.5 * glm::dvec3(b.lo + b.hi), half = 0.5 * glm::dvec3(b.hi - b.lo);
+    for (const glm::dvec4& o : outside_)
+        if (glm::dot(glm::dvec3(o), middle_of) + o.w > glm::dot(glm::abs(glm::dvec3(o)), half)) return false;
+    return true;
 }
 
 void View::set(const gpu::Program& p) const {

@@ -2,6 +2,7 @@
 // middle of the volume, in index coordinates and numbers of planes.
 #pragma once
 
+#include <array>
 #include <glm/glm.hpp>
 
 #include "core/data/camera.h"
@@ -34,6 +35,12 @@ struct View {
         reach_ = 0;
     }
 
+    // Slices so many times as far apart.
+    void widen_slices(int times);
+    // False only where no ray, nor any of those that leap together with one in the picture, comes to a box
+    // of voxels.
+    bool may_meet(const Box& box) const;
+
     // For shading: world axes, lengths in units of the volume's diagonal, from its middle.
     glm::dmat3 index_to_place, gradient_to_world;
     glm::dvec3 middle;           // index coordinates
@@ -49,6 +56,7 @@ struct View {
 
   private:
     int reach_ = 0;
+    std::array<glm::dvec4, 5> outside_;  // index coordinates: above 0 outside of the picture
 };
 
 }  // namespace voxloom::slicer

@@ -44,7 +44,7 @@ void main() {
     bool there = open_page(p + 1e-4 * normalize(cut.xyz)) && inside_box;
 
     float share = part > 0.5 ? share_of_parent(p) : 0.0;
-    vec4 c = colour_of(part > 1.5 ? parent_at_point(p) : part > 0.5 ? own_at_point(p) : reconstruct(p));
+    vec4 c = colour_of(part > 1.5 ? brick_parent(p) : part > 0.5 ? brick_own(p) : reconstruct(p));
     // Axes across which the plane does not go have no border to show.
     vec3 away = min(abs(p - page_lo), abs(page_hi - p)) / footprint;
     away = mix(away, vec3(1e9), lessThanEqual(footprint, vec3(2e-6)));
