@@ -97,7 +97,11 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
                 }
             }
             if (l == top) return;  // the root is not transformed here
-            auto planes = l == 0 ? integers_of(tree, voxels, family) : e.originals(family);
+            thread_local FamilyCodec::Planes planes;
+            if (l == 0)
+                integers_of(tree, voxels, family, planes);
+            else
+                planes = e.originals(family);
             const auto bands = counts && counted.has(i) ? std::make_unique<CoefficientCounts::Bands>() : nullptr;
             to_low_band(tree, family, planes, bands.get());
             if (masked) {

@@ -13,7 +13,13 @@ class BitWriter {
   public:
     void put(std::uint32_t bits, int count) {  // up to 32
         held_ |= std::uint64_t(bits) << held_count_;
-        for (held_count_ += count; held_count_ >= 8; held_count_ -= 8, held_ >>= 8) out_.push_back(std::byte(held_ & 255));
+        held_count_ += count;
+        if (held_count_ < 32) return;
+        const auto word = std::uint32_t(held_);
+        const auto* bytes = reinterpret_cast<const std::byte*>(&word);
+        out_.insert(out_.end(), bytes, bytes + sizeof word);
+        held_ >>= 32;
+        held_count_ -= 32;
     }
     // Any number above 0, in twice its length or a little more.
     void gamma(std::uint32_t v) {
@@ -24,7 +30,7 @@ class BitWriter {
     }
     std::size_t bits() const { return 8 * out_.size() + std::size_t(held_count_); }
     const Bytes& finish() {
-        if (held_count_ > 0) out_.push_back(std::byte(held_ & 255));
+        for (; held_count_ > 0; held_count_ -= 8, held_ >>= 8) out_.push_back(std::byte(held_ & 255));
         held_ = 0;
         held_count_ = 0;
         return out_;

@@ -80,7 +80,9 @@ class Measured final : public CoarseErrors {
         const Box box = own_box(tree_, family);
         const Index3 brick(tree_.bricks.brick), bricks = (box.dims() + brick - Index3(1)) / brick;
         sums.assign(Box::of(bricks).voxels() * levels_.size(), {});
-        std::vector<Real> truth(box.voxels()), counts(box.voxels());
+        thread_local std::vector<Real> truth, counts;  // too large to be got anew for every family
+        truth.resize(box.voxels());
+        counts.resize(box.voxels());
         for (std::size_t c = 0; c < components(); ++c) {
             take_truth(original, box, c, truth, counts);
             for (std::size_t l = 0; l < levels_.size(); ++l)
@@ -127,6 +129,11 @@ class Measured final : public CoarseErrors {
                 for (std::int64_t y = box.lo.y; y < box.hi.y; ++y, at += n) {
                     const auto* row = reinterpret_cast<const decltype(t)*>(original.row(box.lo.x, y, z)) + c;
                     const std::uint8_t* valid = original.mask_row(box.lo.x, y, z);
+                    if (std::is_integral_v<decltype(t)> && !valid && components() == 1) {  // apart, for the compiler's sake
+                        for (std::size_t i = 0; i < n; ++i) truth[at + i] = Real(row[i]);
+                        std::fill_n(counts.data() + at, n, Real(1));
+                        continue;
+                    }
                     for (std::size_t i = 0; i < n; ++i) {
                         const Real v = Real(row[i * components()]);
                         const bool finite = std::isfinite(v) && (!valid || valid[i]);
@@ -147,7 +154,8 @@ class Measured final : public CoarseErrors {
         const std::size_t plane = std::size_t(n.y) * width;
 
         // x
-        std::vector<Real> rows(plane * std::size_t(n.z));
+        thread_local std::vector<Real> rows;
+        rows.resize(plane * std::size_t(n.z));
         const VoxelView view{samples.box, reinterpret_cast<const std::byte*>(samples.plane(c)), sizeof(Real)};
         std::vector<std::size_t> left(width), right(width);
         std::vector<Real> weight(width);

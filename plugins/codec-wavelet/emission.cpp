@@ -86,7 +86,11 @@ class Emission {
             for (std::int64_t i = step / 2; i < some.count; i += step) {
                 check_stop(e_.stop);
                 const FamilyId family = family_at(tree_, l, some.family(i));
-                auto planes = l == 0 ? integers_of(tree_, e_.sample.get(tree_, i, buffer), family) : e_.originals(family);
+                FamilyCodec::Planes planes;
+                if (l == 0)
+                    integers_of(tree_, e_.sample.get(tree_, i, buffer), family, planes);
+                else
+                    planes = e_.originals(family);
                 codec.restore(family, parent_of(family), planes, [&](const Details& d) { index_.coder->train(d); },
                               FamilyCodec::After::spoiled);
             }

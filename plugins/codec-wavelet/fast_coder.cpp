@@ -296,36 +296,43 @@ class FastCoder final : public Coder {
         w.tokens.clear();
         w.contexts.clear();
         BitWriter raw, escapes;
-        struct Coded {
-            Band band;
-            std::size_t at;
-        };
-        std::vector<Coded> bands;
+        std::vector<std::pair<Band, std::size_t>> bands;  // and where its tokens are
         each_coded_band(d, flags, [&](const Band& band) {
             const std::size_t at = w.tokens.size();
             bands.push_back({band, at});
             choose_band(w, d, band, base, tables_.usable(table_set(d.finest, band.mask)));
-            each_lane(w.layout(), band, [&](int, std::size_t i) {
-                put_bits(w.tokens[at + i], w.numbers[i], base, raw, escapes);
-            });
+            const std::uint8_t* const active = w.active_lanes(band);
+            const std::size_t in_slice = std::size_t(w.layout().panels) * std::size_t(w.layout().rows);
+            for (std::size_t group = 0; group < w.layout().groups(band); ++group) {
+                const std::uint8_t* const tokens = w.tokens.data() + at + group * kLanes;
+                if (base == 0 && all_zero(tokens)) continue;
+                for (std::size_t lane = 0; lane < kLanes; ++lane)
+                    if (!active || active[group % in_slice * kLanes + lane])
+                        put_bits(tokens[lane], w.numbers[group * kLanes + lane], base, raw, escapes);
+            }
         });
         Bytes bits = raw.finish();
         bits.resize(std::max(bits.size(), kInStates));
-        std::array<std::uint32_t, kLanes> states;
+        w.words.resize(w.tokens.size() + kWordsBeyond);
+        SymbolSink sink;
+        sink.at = w.words.data();
         for (std::size_t i = 0; i < kLanes; ++i)
-            states[i] = kLowestState | std::uint32_t(bits[2 * i]) | std::uint32_t(bits[2 * i + 1]) << 8;
-        // Backwards, since rANS gives back last what went in first.
-        w.words.clear();
+            sink.states[i] = kLowestState | std::uint32_t(bits[2 * i]) | std::uint32_t(bits[2 * i + 1]) << 8;
         for (auto coded = bands.rbegin(); coded != bands.rend(); ++coded) {
-            const int set = table_set(d.finest, coded->band.mask);
-            each_lane_backwards(w.layout(), coded->band, [&](int lane, std::size_t i) {
-                put_symbol(set, w.contexts[coded->at + i], w.tokens[coded->at + i] % kSymbols, states[std::size_t(lane)], w.words);
-            });
+            const auto& [band, at] = *coded;
+            BandPass pass;
+            pass.slices = band.dims.z;
+            pass.panels = w.layout().panels;
+            pass.rows = w.layout().rows;
+            pass.active = w.active_lanes(band);
+            pass.tokens = w.tokens.data() + at;
+            encode_tokens(pass, w.contexts.data() + at, tables_.symbols(table_set(d.finest, band.mask)), sink);
         }
+        w.words.resize(std::size_t(sink.at - w.words.data()));
         std::reverse(w.words.begin(), w.words.end());
         ByteWriter writer(out);
         writer.number(std::uint8_t(flags));
-        write_states(states, writer);
+        write_states(sink.states, writer);
         writer.varint(w.words.size());
         writer.bytes(std::as_bytes(std::span(w.words)));
         writer.block(std::span(bits).subspan(kInStates));
@@ -344,30 +351,7 @@ class FastCoder final : public Coder {
         }
     }
 
-    template <class Use>
-    static void each_lane_backwards(const LaneLayout& layout, const Band& band, const Use& use) {
-        std::size_t group = layout.groups(band) * kLanes;
-        for (int z = band.dims.z - 1; z >= 0; --z)
-            for (int panel = layout.panels - 1; panel >= 0; --panel)
-                for (int row = layout.rows - 1; row >= 0; --row) {
-                    group -= kLanes;
-                    for (int lane = kLanes - 1; lane >= 0; --lane) {
-                        const int x = panel * layout.width + lane % layout.width, y = row + lane / layout.width * layout.rows;
-                        if (x < band.dims.x && y < band.dims.y) use(lane, group + std::size_t(lane));
-                    }
-                }
-    }
-
-    void put_symbol(int set, int context, int symbol, std::uint32_t& state, std::vector<std::uint16_t>& words) const {
-        const std::uint32_t frequency = tables_.frequency(set, context, symbol);
-        if (state >= frequency << (32 - kPrecision)) {
-            words.push_back(std::uint16_t(state));
-            state >>= 16;
-        }
-        state = (state / frequency << kPrecision) + state % frequency + tables_.first(set, context, symbol);
-    }
-
-    static void write_states(const std::array<std::uint32_t, kLanes>& states, ByteWriter& writer) {
+    static void write_states(std::span<const std::uint32_t, kLanes> states, ByteWriter& writer) {
         BitWriter lengths, rest;
         for (const std::uint32_t state : states) {
             const int length = std::bit_width(state) - 1;

@@ -106,20 +106,24 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
     const std::size_t count = box.voxels();
     const bool exact = keeps_voxels(tree);
     EncodedFamily result;
-    FamilyCodec::Planes planes = integers_of(tree, original, family);
+    thread_local FamilyCodec::Planes planes;
+    integers_of(tree, original, family, planes);
     Buffer near;
     if (volume.has_mask) result.add_mask(mask_of(original, box_of(tree, family)), box_of(tree, family).dims());
-    const auto decode = [&](FamilyCodec::Planes decoded) {
+    const auto decode = [&](FamilyCodec::Planes& decoded) {
         FamilyCodec::crop(decoded, box_of(tree, family), box);
         near = Buffer(count * volume.voxel_bytes(), "voxels decoded");
         codec.to_voxels(decoded, count, near.data());
     };
     if (keeps_integers(tree)) {
-        if (!exact) decode(planes);
+        if (!exact) {
+            FamilyCodec::Planes kept = planes;
+            decode(kept);
+        }
         codec.encode(family, low, planes, result.bytes, FamilyCodec::After::spoiled);
     } else {
         codec.encode(family, low, planes, result.bytes);
-        decode(std::move(planes));
+        decode(planes);
     }
 
     const bool may_patch = is_float(volume.type) || std::isfinite(bound);

@@ -1,5 +1,6 @@
 #include "plugins/codec-wavelet/lane_kernels.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
@@ -20,6 +21,15 @@ inline constexpr auto kRanks = [] {
         for (unsigned lane = 0; lane < 8; ++lane)
             ranks[mask][lane] = std::uint8_t(std::popcount(mask & ((1u << lane) - 1)));
     return ranks;
+}();
+
+// The named lanes themselves, the last one first.
+inline constexpr auto kBackwards = [] {
+    std::array<std::array<std::uint8_t, 8>, 256> lanes{};
+    for (unsigned mask = 0; mask < 256; ++mask)
+        for (unsigned lane = 8, at = 0; lane-- > 0;)
+            if (mask >> lane & 1) lanes[mask][at++] = std::uint8_t(lane);
+    return lanes;
 }();
 
 }  // namespace voxloom::wavelet
@@ -222,6 +232,68 @@ void ChooseTokens(const BandPass& band, const std::int32_t* numbers, const std::
         walk<false>(band, coding);
 }
 
+// Quotients below 2^31 of a state by a frequency of 11 bits. They stand at least 2^-11 below the next integer, so that
+// double precision never rounds up to it.
+HWY_INLINE V quotients(V states, V frequencies) {
+    const D32 d;
+#if HWY_TARGET == HWY_SCALAR
+    return hn::Set(d, hn::GetLane(states) / std::max(hn::GetLane(frequencies), 1u));
+#else
+    const hn::Half<D32> half;
+    const hn::RepartitionToWide<D32> wide;
+    const hn::Rebind<double, decltype(wide)> real;
+    const auto real_of = [&](auto v) HWY_ATTR {  // 2^52 + v has the bits of v below
+        return hn::Sub(hn::BitCast(real, hn::Or(hn::PromoteTo(wide, v), hn::Set(wide, 0x4330000000000000u))), hn::Set(real, 0x1p52));
+    };
+    const auto divided = [&](auto a, auto b) HWY_ATTR {
+        return hn::BitCast(half, hn::DemoteTo(hn::RebindToSigned<decltype(half)>(), hn::Div(real_of(a), real_of(b))));
+    };
+    return hn::Combine(d, divided(hn::UpperHalf(half, states), hn::UpperHalf(half, frequencies)),
+                       divided(hn::LowerHalf(half, states), hn::LowerHalf(half, frequencies)));
+#endif
+}
+
+template <bool kRagged>
+HWY_INLINE void encode_groups(const BandPass& b, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink) {
+    const D32 d;
+    const DI32 di;
+    V states[kVectors];
+    for (std::size_t i = 0; i < kVectors; ++i) states[i] = hn::LoadU(d, sink.states + i * kEach);
+    std::uint16_t* at = sink.at;
+    const std::size_t in_slice = std::size_t(b.panels) * std::size_t(b.rows);
+    for (std::size_t group = std::size_t(b.slices) * in_slice; group-- > 0;)
+        for (std::size_t i = kVectors; i-- > 0;) {
+            const std::size_t lane = group * kLaneCount + i * kEach;
+            const V symbol = hn::And(bytes_at(b.tokens + lane), hn::Set(d, kSymbols - 1));
+            const V entry = hn::GatherIndex(d, symbols, hn::BitCast(di, hn::Add(hn::ShiftLeft<4>(bytes_at(contexts + lane)), symbol)));
+            const V frequency = hn::And(entry, hn::Set(d, 0xffff)), first = hn::ShiftRight<16>(entry);
+            // A state that would grow beyond 32 bits gives off a word.
+            V full = hn::VecFromMask(d, hn::Not(hn::RebindMask(d, hn::Lt(hn::BitCast(di, hn::ShiftRight<32 - kPrecision>(states[i])),
+                                                                         hn::BitCast(di, frequency)))));
+            const V on = kRagged ? bytes_at(b.active + group % in_slice * kLaneCount + i * kEach) : full;
+            if (kRagged) full = hn::IfThenZeroElse(hn::Eq(on, hn::Zero(d)), full);
+            std::uint8_t bits[8] = {};
+            hn::StoreMaskBits(d, hn::MaskFromVec(full), bits);
+            const V words = hn::TableLookupLanes(hn::And(states[i], hn::Set(d, 0xffff)),
+                                                 hn::IndicesFromVec(d, bytes_at(kBackwards[bits[0]].data())));
+            hn::StoreU(hn::DemoteTo(DWords(), hn::BitCast(di, words)), DWords(), at);
+            at += std::popcount(bits[0]);
+            const V state = hn::IfThenElse(hn::MaskFromVec(full), hn::ShiftRight<16>(states[i]), states[i]);
+            const V next = hn::Add(hn::Add(state, first),
+                                   hn::Mul(quotients(state, frequency), hn::Sub(hn::Set(d, kTotal), frequency)));
+            states[i] = kRagged ? hn::IfThenElse(hn::Eq(on, hn::Zero(d)), state, next) : next;
+        }
+    for (std::size_t i = 0; i < kVectors; ++i) hn::StoreU(states[i], d, sink.states + i * kEach);
+    sink.at = at;
+}
+
+void EncodeTokens(const BandPass& band, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink) {
+    if (band.active)
+        encode_groups<true>(band, contexts, symbols, sink);
+    else
+        encode_groups<false>(band, contexts, symbols, sink);
+}
+
 // Sums of all lanes before each.
 HWY_INLINE V sums_before(V v) {
 #if HWY_TARGET == HWY_SCALAR
@@ -303,6 +375,7 @@ namespace voxloom::wavelet {
 
 HWY_EXPORT(DecodeTokens);
 HWY_EXPORT(ChooseTokens);
+HWY_EXPORT(EncodeTokens);
 HWY_EXPORT(ExpandGroup);
 HWY_EXPORT(FindEdges);
 
@@ -311,6 +384,9 @@ bool decode_tokens(const BandPass& band, const std::uint32_t* slots, SymbolSourc
 }
 void choose_tokens(const BandPass& band, const std::int32_t* numbers, const std::uint32_t* usable, std::uint8_t* contexts) {
     HWY_DYNAMIC_DISPATCH(ChooseTokens)(band, numbers, usable, contexts);
+}
+void encode_tokens(const BandPass& band, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink) {
+    HWY_DYNAMIC_DISPATCH(EncodeTokens)(band, contexts, symbols, sink);
 }
 void expand_group(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,
                   std::uint64_t& at, std::int32_t* numbers) {

@@ -53,6 +53,15 @@ bool decode_tokens(const BandPass& band, const std::uint32_t* slots, SymbolSourc
 // lanes are not active. Bit s of usable[c]: symbol s has a frequency in context c.
 void choose_tokens(const BandPass& band, const std::int32_t* numbers, const std::uint32_t* usable, std::uint8_t* contexts);
 
+// The states of the encoder, and the words they give off: backwards, since rANS gives back last what went in first.
+struct SymbolSink {
+    std::uint32_t states[kLanes];
+    std::uint16_t* at;         // room for a word a number, and 8 more
+};
+// Takes up the symbols of a band's tokens, from the last to the first. symbols[kSymbols * context + symbol]: frequency, and
+// from bit 16 on the sum of those before it. Of `band` tokens, active and the number of groups are looked at.
+void encode_tokens(const BandPass& band, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink);
+
 // Numbers of 32 tokens from raw bits that start at bit `at` of `raw`, of which 128 bytes beyond the last bit can be
 // read; `at` moves on. Escapes are left with symbol kEscape.
 void expand_group(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,

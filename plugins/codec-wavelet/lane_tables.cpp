@@ -117,7 +117,7 @@ void LaneTables::build() {
             const std::uint32_t off = (std::max(c, 15u) - 15) / 2;  // as the kernels' bits_off()
             std::uint32_t first = 0;
             for (std::uint32_t s = 0; s < kSymbols; ++s) {
-                first_[set][c][s] = std::uint16_t(first);
+                symbols_[set][c * kSymbols + s] = row[s] | first << 16;
                 first += row[s];
                 if (row[s] > 0 && s != kEscape) usable_[set][c] |= 1u << s;
                 for (std::uint32_t i = 0; i < row[s]; ++i)

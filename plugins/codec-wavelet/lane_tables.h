@@ -31,19 +31,15 @@ class LaneTables {
     int base(bool finest) const { return bases_[std::size_t(finest)]; }
     const std::uint32_t* slots(int set) const { return slots_.data() + std::size_t(set) * kContexts * kTotal; }
     const std::uint32_t* usable(int set) const { return usable_[std::size_t(set)].data(); }
-    std::uint32_t frequency(int set, int context, int symbol) const { return at(set, context)[std::size_t(symbol)]; }
-    // Of the symbols before it.
-    std::uint32_t first(int set, int context, int symbol) const {
-        return first_[std::size_t(set)][std::size_t(context)][std::size_t(symbol)];
-    }
+    const std::uint32_t* symbols(int set) const { return symbols_[std::size_t(set)].data(); }
 
   private:
     using Row = std::array<std::uint16_t, kSymbols>;
-    const Row& at(int set, int context) const { return frequencies_[std::size_t(set)][std::size_t(context)]; }
     void build();
 
     Bases bases_{};
-    std::array<std::array<Row, kContexts>, kTableSets> frequencies_{}, first_{};
+    std::array<std::array<Row, kContexts>, kTableSets> frequencies_{};
+    std::array<std::array<std::uint32_t, kContexts * kSymbols>, kTableSets> symbols_{};
     std::array<std::array<std::uint32_t, kContexts>, kTableSets> usable_{};
     std::vector<std::uint32_t> slots_;
 };

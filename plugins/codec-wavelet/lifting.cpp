@@ -122,58 +122,75 @@ void inverse_rows(const T* __restrict in, T* __restrict out, int n, std::size_t 
     }
 }
 
+// The axes that take part. Those across rows go to and fro between box and scratch; lines along x, which a small
+// buffer holds, are worked on in place or lead to the other side, so that the result ends up in the box.
+template <class T>
+struct Passes {
+    std::size_t width, plane, all;
+    bool x, y, z;
+    Passes(glm::ivec3 dims, glm::bvec3 halved, std::vector<T>& scratch)
+        : width(std::size_t(dims.x)), plane(width * std::size_t(dims.y)), all(plane * std::size_t(dims.z)),
+          x(halved.x && dims.x > 1), y(halved.y && dims.y > 1), z(halved.z && dims.z > 1) {
+        scratch.resize(std::max(scratch.size(), all + 2 * width));
+    }
+    bool odd() const { return y != z; }
+};
+
 }  // namespace
 
 template <class T>
 void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch,
              Ends shared) {
-    const std::size_t width = std::size_t(dims.x), plane = width * std::size_t(dims.y);
-    const std::size_t all = plane * std::size_t(dims.z);
+    const Passes<T> passes(dims, halved, scratch);
     const T p = T(rounding);
-    scratch.resize(std::max(scratch.size(), all));
+    T* const line = scratch.data() + passes.all;
     T* from = box;
     T* to = scratch.data();
-    if (halved.x && dims.x > 1) {
-        for (std::size_t row = 0; row < all; row += width) forward_line(from + row, to + row, dims.x, p, at_ends(shared, 0));
+    if (passes.x) {
+        T* const out = passes.odd() ? to : box;
+        for (std::size_t row = 0; row < passes.all; row += passes.width) {
+            std::copy_n(box + row, passes.width, line);
+            forward_line(line, out + row, dims.x, p, at_ends(shared, 0));
+        }
+        if (passes.odd()) std::swap(from, to);
+    }
+    if (passes.y) {
+        for (std::size_t z = 0; z < passes.all; z += passes.plane)
+            forward_rows(from + z, to + z, dims.y, passes.width, p, at_ends(shared, 1));
         std::swap(from, to);
     }
-    if (halved.y && dims.y > 1) {
-        for (std::size_t z = 0; z < all; z += plane)
-            forward_rows(from + z, to + z, dims.y, width, p, at_ends(shared, 1));
+    if (passes.z) {
+        forward_rows(from, to, dims.z, passes.plane, p, at_ends(shared, 2));
         std::swap(from, to);
     }
-    if (halved.z && dims.z > 1) {
-        forward_rows(from, to, dims.z, plane, p, at_ends(shared, 2));
-        std::swap(from, to);
-    }
-    if (from != box) std::memcpy(box, from, all * sizeof(T));
+    if (from != box) std::memcpy(box, from, passes.all * sizeof(T));
 }
 
 template <class T>
 void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std::vector<T>& scratch,
              Ends shared) {
-    const std::size_t width = std::size_t(dims.x), plane = width * std::size_t(dims.y);
-    const std::size_t all = plane * std::size_t(dims.z);
+    const Passes<T> passes(dims, halved, scratch);
     const T p = T(rounding);
-    scratch.resize(std::max(scratch.size(), all + width));
-    T* const even = scratch.data() + all;
+    T* const line = scratch.data() + passes.all;
     T* from = box;
     T* to = scratch.data();
-    if (halved.z && dims.z > 1) {
-        inverse_rows(from, to, dims.z, plane, p, at_ends(shared, 2));
+    if (passes.z) {
+        inverse_rows(from, to, dims.z, passes.plane, p, at_ends(shared, 2));
         std::swap(from, to);
     }
-    if (halved.y && dims.y > 1) {
-        for (std::size_t z = 0; z < all; z += plane)
-            inverse_rows(from + z, to + z, dims.y, width, p, at_ends(shared, 1));
+    if (passes.y) {
+        for (std::size_t z = 0; z < passes.all; z += passes.plane)
+            inverse_rows(from + z, to + z, dims.y, passes.width, p, at_ends(shared, 1));
         std::swap(from, to);
     }
-    if (halved.x && dims.x > 1) {
-        for (std::size_t row = 0; row < all; row += width)
-            inverse_line(from + row, to + row, dims.x, p, at_ends(shared, 0), even);
-        std::swap(from, to);
+    if (passes.x) {
+        for (std::size_t row = 0; row < passes.all; row += passes.width) {
+            std::copy_n(from + row, passes.width, line);
+            inverse_line(line, box + row, dims.x, p, at_ends(shared, 0), line + passes.width);
+        }
+        return;
     }
-    if (from != box) std::memcpy(box, from, all * sizeof(T));
+    if (from != box) std::memcpy(box, from, passes.all * sizeof(T));
 }
 
 template void forward<std::int16_t>(std::int16_t*, glm::ivec3, glm::bvec3, Rounding, std::vector<std::int16_t>&, Ends);

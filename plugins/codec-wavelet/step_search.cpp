@@ -38,8 +38,9 @@ StepSearch::StepSearch(Encoding& e, int& rounds) : e_(e), rounds_(rounds), count
     const NoCoder none;
     set_step(0);
     std::vector<std::int32_t> scratch;
-    sweep(FamilyCodec(tree, none), [&](FamilyId family, const FamilyCodec::Planes&, FamilyCodec::Planes planes, const VoxelView&) {
+    sweep(FamilyCodec(tree, none), Order::given, [&](FamilyId family, std::size_t, const FamilyCodec::Planes&, FamilyCodec::Planes& planes, const VoxelView& voxels) {
         if (family.level == tree.top()) return;
+        if (family.level == 0) integers_of(tree, voxels, family, planes);
         const Shape shape = shape_of(tree, family);
         CoefficientCounts::Bands bands;
         for (auto& plane : planes) {
@@ -59,15 +60,16 @@ void StepSearch::set_step(double step) {
     q.centre_more = kCentreMore;
 }
 
-// Top down, level by level: use(family, the restored parent's samples, its own integers, its voxels at level 0).
+// Top down, level by level: use(family, its place in families_, the restored parent's samples, its own integers, which
+// may be spoiled, its voxels). At level 0 there are voxels and no integers yet, above it the other way round.
 template <class Use>
-void StepSearch::sweep(const FamilyCodec& codec, const Use& use) {
+void StepSearch::sweep(const FamilyCodec& codec, Order order, const Use& use) {
     const TreeDesc& tree = e_.tree;
     std::vector<FamilyCodec::Planes> above, here;
     for (int l = tree.top(); l >= 0; --l) {
         const auto& families = families_[std::size_t(l)];
         here.assign(families.size(), {});
-        for (std::size_t k = 0; k < families.size(); ++k) {
+        const auto one = [&](std::size_t k) {
             check_stop(e_.stop);
             const FamilyId family = family_at(tree, l, families[k]);
             FamilyCodec::Planes low;
@@ -83,24 +85,27 @@ void StepSearch::sweep(const FamilyCodec& codec, const Use& use) {
                              reinterpret_cast<std::byte*>(low.back().data()), parent, sizeof(std::int32_t));
                 }
             }
-            Buffer buffer;
-            VoxelView voxels;
-            FamilyCodec::Planes planes;
+            thread_local FamilyCodec::Planes planes;
             if (l == 0) {
-                voxels = e_.sample.get(tree, e_.sample.selection().slot(families[k]), buffer);
-                planes = integers_of(tree, voxels, family);
-            } else {
-                planes = e_.originals(family);
-                const std::int32_t half = shift_ > 0 ? 1 << (shift_ - 1) : 0;
-                if (shift_ > 0)
-                    for (auto& plane : planes)
-                        for (std::int32_t& v : plane) v = (v + half) >> shift_;
+                Buffer buffer;
+                const VoxelView voxels = e_.sample.get(tree, e_.sample.selection().slot(families[k]), buffer);
+                return use(family, k, low, planes, voxels);
             }
-            use(family, low, planes, voxels);
-            if (l == 0) continue;
-            if (!keeps_integers(tree)) codec.restore(family, low, planes, [](const Details&) {});
-            here[k] = std::move(planes);
-        }
+            planes = e_.originals(family);
+            const std::int32_t half = shift_ > 0 ? 1 << (shift_ - 1) : 0;
+            if (shift_ > 0)
+                for (auto& plane : planes)
+                    for (std::int32_t& v : plane) v = (v + half) >> shift_;
+            here[k] = planes;
+            use(family, k, low, planes, VoxelView());
+            if (!keeps_integers(tree)) codec.restore(family, low, here[k], [](const Details&) {});
+        };
+        if (order == Order::any)
+            parallel_for(0, std::int64_t(families.size()), 1, [&](std::int64_t lo, std::int64_t hi) {
+                for (std::int64_t k = lo; k < hi; ++k) one(std::size_t(k));
+            }, e_.stop);
+        else
+            for (std::size_t k = 0; k < families.size(); ++k) one(k);
         above = std::move(here);
         here.clear();
     }
@@ -114,32 +119,44 @@ Estimate StepSearch::estimate(bool with_bytes) {
     const FamilyCodec codec(tree, coder ? *coder : static_cast<const Coder&>(none));
     if (with_bytes) {
         if (families_to_learn_from(coder->kind()) > 0)
-            sweep(codec, [&](FamilyId family, const FamilyCodec::Planes& low, FamilyCodec::Planes planes, const VoxelView&) {
+            sweep(codec, Order::given, [&](FamilyId family, std::size_t, const FamilyCodec::Planes& low, FamilyCodec::Planes& planes, const VoxelView& voxels) {
+                if (family.level == 0) integers_of(tree, voxels, family, planes);
                 if (family.level < tree.top())
                     codec.restore(family, low, planes, [&](const Details& d) { coder->train(d); }, FamilyCodec::After::spoiled);
             });
         coder->finish_training();
     }
-    double squares = 0, bytes = with_bytes ? double(coder->tables().size()) : 0;
-    std::uint64_t finite = 0;
-    sweep(codec, [&](FamilyId family, const FamilyCodec::Planes& low, FamilyCodec::Planes planes, const VoxelView& voxels) {
-        std::size_t own = 0;
+    struct Part {
+        std::size_t bytes = 0;
+        double squares = 0;
+        std::uint64_t finite = 0;
+    };
+    std::vector<std::vector<Part>> parts;
+    for (const auto& families : families_) parts.emplace_back(families.size());
+    sweep(codec, Order::any, [&](FamilyId family, std::size_t k, const FamilyCodec::Planes& low, FamilyCodec::Planes& planes, const VoxelView& voxels) {
+        Part& part = parts[std::size_t(family.level)][k];
         if (family.level > 0) {
             if (!with_bytes) return;
             Bytes out;
             codec.encode(family, low, planes, out, FamilyCodec::After::spoiled);
-            own = out.size();
+            part.bytes = out.size();
         } else {
             const EncodedFamily encoded = encode_fine(codec, tree, family, voxels, low, error_bound(e_.options, tree), nullptr);
             for (const MeasuredBrick& brick : encoded.bricks) {
-                squares += brick.squares;
-                finite += brick.finite;
+                part.squares += brick.squares;
+                part.finite += brick.finite;
             }
-            own = encoded.bytes.size();
+            part.bytes = encoded.bytes.size();
         }
-        const auto l = std::size_t(family.level);
-        bytes += double(own) * double(family_count(tree, family.level)) / double(families_[l].size());
     });
+    double squares = 0, bytes = with_bytes ? double(coder->tables().size()) : 0;
+    std::uint64_t finite = 0;
+    for (int l = tree.top(); l >= 0; --l)
+        for (const Part& part : parts[std::size_t(l)]) {
+            bytes += double(part.bytes) * double(family_count(tree, l)) / double(parts[std::size_t(l)].size());
+            squares += part.squares;
+            finite += part.finite;
+        }
 
     Estimate result{finite ? squares / double(finite) : 0, 0};
     // What the sample is short of, or has too much of.

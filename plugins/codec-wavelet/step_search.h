@@ -34,8 +34,9 @@ class StepSearch {
     void correct_bytes(double got, double wanted);
 
   private:
+    enum class Order { given, any };  // any: in parallel within a level
     template <class Use>
-    void sweep(const FamilyCodec& codec, const Use& use);
+    void sweep(const FamilyCodec& codec, Order order, const Use& use);
     void find(double start, double goal, double slope, const std::function<double()>& measure);
     double start_of(double goal, const std::function<double()>& model);
 

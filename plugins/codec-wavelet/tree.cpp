@@ -42,17 +42,6 @@ void put_low(const std::int32_t* low, const Shape& shape, std::int32_t* box) {
         for (int y = 0; y < n.y; ++y, low += n.x) std::copy_n(low, n.x, box + shape.at({0, y, z}));
 }
 
-template <class Row>
-void for_each_band_row(const Details& d, const Row& row) {
-    for (int mask : kBandOrder) {
-        const Band b = d.shape.band(mask);
-        if (!d.shape.has(b)) continue;
-        for (int z = 0; z < b.dims.z; ++z)
-            for (int y = 0; y < b.dims.y; ++y)
-                row(mask, d.q + d.shape.at(b.lo + glm::ivec3(0, y, z)), b.dims.x);
-    }
-}
-
 }  // namespace
 
 glm::ivec3 families_of(const TreeDesc& tree, int level) {
@@ -123,68 +112,8 @@ void FamilyCodec::set_steps(Details& d, glm::ivec3 fine_stride) const {
                 std::max(1.0, tree_.quantiser.step / band_norm(mask, fine_stride, glm::bvec3(glm::ivec3(d.shape.halved) | glm::ivec3(d.shape.split))));
 }
 
-void FamilyCodec::quantise(Details& d) const {
-    if (tree_.quantiser.threshold > 0) {
-        const double threshold = tree_.quantiser.threshold;
-        for_each_band_row(d, [&](int, std::int32_t* q, int n) {
-            for (int x = 0; x < n; ++x)
-                if (std::abs(double(q[x])) < threshold) q[x] = 0;
-        });
-    }
-    for (int mask : kBandOrder) {
-        const Band band = d.shape.band(mask);
-        const double scale = 1 / d.step[std::size_t(mask)];
-        if (!d.shape.has(band) || scale >= 1) continue;
-        const auto cuts_along = [&](int a) {
-            const bool low = !(mask >> a & 1);
-            return cuts(band.dims[a], low && d.shape.shared.lo[a], low && d.shape.shared.hi[a], kQuantBlock);
-        };
-        const auto x = cuts_along(0), y = cuts_along(1), z = cuts_along(2);
-        for (std::size_t k = 0; k + 1 < z.size(); ++k)
-            for (std::size_t j = 0; j + 1 < y.size(); ++j)
-                for (std::size_t i = 0; i + 1 < x.size(); ++i)
-                    quantise_block(d, band, {x[i], y[j], z[k]}, {x[i + 1], y[j + 1], z[k + 1]}, scale);
-    }
-}
-
-void FamilyCodec::quantise_block(Details& d, const Band& band, glm::ivec3 lo, glm::ivec3 hi, double scale) const {
-    const auto each_row = [&](auto&& use) {
-        for (int z = lo.z; z < hi.z; ++z)
-            for (int y = lo.y; y < hi.y; ++y) use(d.q + d.shape.at(band.lo + glm::ivec3(lo.x, y, z)));
-    };
-    const auto number_of = [scale](std::int32_t c, double zone) {
-        const double size = std::abs(double(c)) * scale;
-        return size < zone ? 0 : std::max(1, std::int32_t(size + kRoundUp));
-    };
-    std::int64_t sum = 0;
-    each_row([&](const std::int32_t* q) {
-        for (int x = 0; x < hi.x - lo.x; ++x) sum += number_of(q[x], kDeadZone);
-    });
-    const double zone = sum == 1 ? kDeadZoneOfOne : sum == 2 ? kDeadZoneOfTwo : sum <= 4 ? kDeadZoneOfFour : kDeadZone;
-    each_row([&](std::int32_t* q) {
-        for (int x = 0; x < hi.x - lo.x; ++x) {
-            const std::int32_t number = number_of(q[x], zone);
-            q[x] = q[x] < 0 ? -number : number;
-        }
-    });
-}
-
 void FamilyCodec::rebuild(Details& d) const {
-    const Quantiser& quantiser = tree_.quantiser;
-    for_each_band_row(d, [&](int mask, std::int32_t* q, int n) {
-        const double step = d.step[std::size_t(mask)];
-        if (step <= 1) return;
-        std::int32_t any = 0;  // most rows are empty
-        for (int x = 0; x < n; ++x) any |= q[x];
-        if (any == 0) return;
-        const double one = quantiser.centre_one * step + 0.5, more = quantiser.centre_more * step + 0.5;
-        for (int x = 0; x < n; ++x) {
-            const double magnitude = std::abs(double(q[x]));
-            const double size = std::min(magnitude * step + (magnitude == 1 ? one : more), 2147483647.0);
-            const auto value = q[x] == 0 ? 0 : std::int32_t(size);
-            q[x] = q[x] < 0 ? -value : value;
-        }
-    });
+    dequantise(d, tree_.quantiser);
     put_low(d.low, d.shape, d.q);
 }
 
@@ -232,7 +161,7 @@ void FamilyCodec::encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims,
     encode_root(low, n, stride * glm::mix(glm::ivec3(1), glm::ivec3(2), d.shape.halved), out);
     d.low = low.data();
     set_steps(d, stride);
-    quantise(d);
+    quantise(d, tree_.quantiser);
     Bytes part;
     coder_.encode(d, part);
     writer.block(part);

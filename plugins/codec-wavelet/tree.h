@@ -19,6 +19,7 @@
 
 #include "core/data/bricks.h"
 #include "plugins/codec-wavelet/coder.h"
+#include "plugins/codec-wavelet/quantiser.h"
 #include "plugins/codec-wavelet/value_map.h"
 
 namespace voxloom::wavelet {
@@ -28,14 +29,6 @@ enum class Faces : std::uint8_t { block = 0, shared = 1 };
 struct FamilyId {
     int level = 0;        // of the children
     glm::ivec3 index{0};  // of the parent
-};
-
-// How coefficients became numbers. step == 0 means that they are kept as they are.
-struct Quantiser {
-    double step = 0;          // on level 0, in units of the tree: each band's is step / band_norm()
-    double threshold = 0;     // the paper's: smaller coefficients are dropped, others kept whole
-    // Numbers of magnitude 1, and larger ones, stand for magnitude + centre steps.
-    double centre_one = 0, centre_more = 0;
 };
 
 struct TreeDesc {
@@ -98,8 +91,6 @@ class FamilyCodec {
   private:
     Details details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const;
     void set_steps(Details& d, glm::ivec3 fine_stride) const;
-    void quantise(Details& d) const;
-    void quantise_block(Details& d, const Band& band, glm::ivec3 lo, glm::ivec3 hi, double scale) const;
     void rebuild(Details& d) const;
     void encode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, Bytes& out) const;
     void decode_root(std::vector<std::int32_t>& plane, glm::ivec3 dims, glm::ivec3 stride, ByteReader& in) const;
@@ -107,16 +98,6 @@ class FamilyCodec {
     const TreeDesc& tree_;
     const Coder& coder_;
 };
-
-// Where the quantiser rounds: |c| / step below `first` gives 0, and what is left up by `up`. A wide dead
-// zone costs little error, since small coefficients are many, and saves most of their bits.
-inline constexpr double kDeadZone = 0.75, kRoundUp = 0.3;
-// A number that stands nearly alone in its block costs ten bits or so, more than the error it saves:
-// the zone is wider where the numbers of a block of 4^3 add up to 1, 2, or at most 4. One per cent of the rate.
-inline constexpr double kDeadZoneOfOne = 1.1, kDeadZoneOfTwo = 0.95, kDeadZoneOfFour = 0.85;
-inline constexpr int kQuantBlock = 4;
-inline constexpr double kCentreOne = (kDeadZone + 2 - kRoundUp) / 2 - 1 - 0.12;  // less the density's slope
-inline constexpr double kCentreMore = 0.5 - kRoundUp - 0.04;
 
 template <class Use>
 void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, const Use& use, After after) const {
@@ -130,7 +111,7 @@ void FamilyCodec::restore(FamilyId family, const Planes& low, Planes& planes, co
         thread_local std::vector<std::int32_t> scratch;
         Details d = details_of(family, low[c], planes[c].data());
         split_family(d.q, d.shape, tree_.rounding, scratch);
-        quantise(d);
+        quantise(d, tree_.quantiser);
         use(d);
         if (after == After::spoiled) continue;
         rebuild(d);

@@ -115,11 +115,12 @@ void fill_parts(const Shape& shape, std::vector<std::int32_t>& plane, std::vecto
 
 }  // namespace
 
-FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, FamilyId family) {
+void integers_of(const TreeDesc& tree, const VoxelView& voxels, FamilyId family, FamilyCodec::Planes& planes) {
     const VolumeDesc& volume = tree.bricks.volume;
     const Box box = box_of(tree, family);
     const auto components = std::size_t(volume.components), row = std::size_t(box.dims().x);
-    FamilyCodec::Planes planes(components, std::vector<std::int32_t>(box.voxels()));
+    planes.resize(components);
+    for (auto& plane : planes) plane.resize(box.voxels());
     const int shift = tree.map.shift();
     if (!is_float(volume.type) && bytes_of(volume.type) <= 2 && shift >= 0 && !voxels.mask) {
         with_type(volume.type, [&](auto t) {
@@ -128,7 +129,7 @@ FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, F
                 for (std::size_t c = 0; c < components; ++c) shifted_row(from + c, row, components, shift, planes[c].data() + at);
             });
         });
-        return planes;
+        return;
     }
     std::vector<double> values(row * components);
     std::vector<std::vector<std::uint8_t>> known(components, std::vector<std::uint8_t>(box.voxels()));
@@ -144,7 +145,6 @@ FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, F
     });
     const double middle = volume.range ? volume.range->min / 2 + volume.range->max / 2 : 0;
     for (std::size_t c = 0; c < components; ++c) fill_parts(shape_of(tree, family), planes[c], known[c], tree.map.tree(middle));
-    return planes;
 }
 
 }  // namespace voxloom::wavelet

@@ -37,7 +37,8 @@ class VoxelTile {
 };
 
 // The tree's integers of a family of level 0. What is not finite or not valid is filled from what is near: a jump would
-// cost details. Shared faces are filled from what they hold themselves.
-FamilyCodec::Planes integers_of(const TreeDesc& tree, const VoxelView& voxels, FamilyId family);
+// cost details. Shared faces are filled from what they hold themselves. `planes` may be those of another family:
+// memory is got anew only where it does not do.
+void integers_of(const TreeDesc& tree, const VoxelView& voxels, FamilyId family, FamilyCodec::Planes& planes);
 
 }  // namespace voxloom::wavelet
