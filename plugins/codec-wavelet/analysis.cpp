@@ -1,9 +1,11 @@
 #include "plugins/codec-wavelet/analysis.h"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <mutex>
 
+#include "core/base/meter.h"
 #include "plugins/codec-wavelet/passes.h"
 
 namespace voxloom::wavelet {
@@ -81,6 +83,7 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
     e.counts = CoefficientCounts(tree);
     ValueRange range = kNothing;
     std::mutex mutex;
+    std::atomic<std::int64_t> transform_ns{0};
 
     for (int l = 0; l < std::max(top, 1); ++l) {
         const Progress here = progress.part(l == 0 ? 0 : 1 - 0.15 / l, 1 - 0.15 / (l + 1));
@@ -98,12 +101,14 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
             }
             if (l == top) return;  // the root is not transformed here
             thread_local FamilyCodec::Planes planes;
+            const std::int64_t start = thread_cpu_ns();
             if (l == 0)
                 integers_of(tree, voxels, family, planes);
             else
                 planes = e.originals(family);
             const auto bands = counts && counted.has(i) ? std::make_unique<CoefficientCounts::Bands>() : nullptr;
             to_low_band(tree, family, planes, bands.get());
+            transform_ns += thread_cpu_ns() - start;
             if (masked) {
                 const Mask low = low_mask(l == 0 ? mask_of(voxels, box_of(tree, family)) : e.mask(family), shape_of(tree, family));
                 planes.emplace_back(low.begin(), low.end());
@@ -124,6 +129,7 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
             at = tile.last;
         }
     }
+    e.transform_seconds = double(transform_ns) * 1e-9;
     if (!range_known) e.tree.bricks.volume.range = range;
     progress(1);
 }

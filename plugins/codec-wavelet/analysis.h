@@ -18,6 +18,7 @@ struct Encoding {
     std::vector<LevelStore> original;   // integers of the levels; [0] is not used
     Sample sample;
     CoefficientCounts counts;           // of the details, where a step is looked for
+    double transform_seconds = 0;       // CPU time of the last analysis without reading
 
     ScalarType type() const { return tree.bricks.volume.type; }
     const ValueRange& range() const { return *tree.bricks.volume.range; }

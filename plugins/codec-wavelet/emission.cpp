@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/meter.h"
 #include "plugins/codec-wavelet/file_format.h"
 #include "plugins/codec-wavelet/payload.h"
 
@@ -138,7 +139,9 @@ class Emission {
         EncodedFamily result;
         auto planes = e_.originals(family);
         if (tree_.bricks.volume.has_mask) result.add_mask(e_.mask(family), box.dims());
+        const std::int64_t start = thread_cpu_ns();
         codec.encode(family, parent_of(family), planes, result.bytes);
+        result.codec_ns = thread_cpu_ns() - start;
         result.drop_if_empty();
         result.check = check_of(result.bytes);
         for (const BrickId& id : bricks_of(tree_, family)) {
@@ -157,6 +160,7 @@ class Emission {
         ++report_.families;
         report_.empty_families += family.bytes.empty();
         report_.patches += family.patches;
+        report_.codec_seconds += double(family.codec_ns) * 1e-9;
         for (std::size_t b = 0; b < family.bricks.size(); ++b) {
             const MeasuredBrick& brick = family.bricks[b];
             BrickInfo& info = infos[place_of(tree_.bricks, brick.id)];
@@ -196,6 +200,7 @@ class Emission {
 
     std::shared_ptr<const WaveletBricks> finish(EncodeReport& report) {
         report_.rounds = report.rounds;
+        report_.codec_seconds += e_.transform_seconds;
         report_.rmse = finite_ ? std::sqrt(squares_ / double(finite_)) : 0;
         report_.psnr = report_.rmse > 0 ? 20 * std::log10(e_.range().extent() / report_.rmse) : std::numeric_limits<double>::infinity();
         index_.tree = tree_;

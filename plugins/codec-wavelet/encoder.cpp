@@ -20,7 +20,7 @@ constexpr double kPsnrSlack = 0.1;  // dB above what was asked for
 class Encoder {
   public:
     Encoder(const Volume& volume, const EncodeOptions& options, const std::stop_token& stop, const Progress& progress)
-        : e_{volume, options, stop, {}, plan(volume.desc(), options), {}, {}, {}}, options_(options), progress_(progress) {}
+        : e_{volume, options, stop, {}, plan(volume.desc(), options), {}, {}, {}, 0}, options_(options), progress_(progress) {}
 
     std::shared_ptr<const WaveletBricks> run(EncodeReport& report) {
         report = {};

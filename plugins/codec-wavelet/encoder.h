@@ -27,6 +27,7 @@ struct EncodeReport {
     double bits_per_voxel = 0;                 // all of what a file holds
     std::uint64_t empty_families = 0, families = 0, patches = 0;
     int rounds = 0;                            // of the search for the step
+    double codec_seconds = 0;                  // CPU time of one pass of transform, quantiser and coder
 };
 
 // Same volume and options, same bytes, whatever the threads and the memory. The volume is read slab by slab, once

@@ -20,10 +20,10 @@
 #include <random>
 
 #include "core/base/error.h"
-#include "plugins/codec-wavelet/bit_io.h"
 #include "core/base/byte_io.h"
-#include "plugins/codec-wavelet/lane_edges.h"
+#include "plugins/codec-wavelet/bit_io.h"
 #include "plugins/codec-wavelet/lane_tables.h"
+#include "plugins/codec-wavelet/lane_workspace.h"
 #include "plugins/codec-wavelet/sparse_list.h"
 
 namespace voxloom::wavelet {
@@ -35,89 +35,7 @@ constexpr std::size_t kInStates = 2 * kLanes;        // bytes of raw bits that t
 constexpr std::size_t kSparseNumbers = 1000;         // more are never shorter as a list
 constexpr std::size_t kWordsBeyond = 64, kRawBeyond = 128;  // what the kernels may read past the end
 
-// Bands already coded whose sizes tell of a band's, and how much each neighbour does: fitted by least squares to two
-// CT scans at 40 and 50 dB and without loss.
-struct Role {
-    int first, second;
-    ContextWeights weights;
-};
-constexpr std::array<Role, 8> kRoles = {{
-    {},
-    {0, 0, {12, 3, 18, 2, 4, 0, 0, 6}},
-    {1, 0, {7, 3, 17, 4, 1, 4, 0, 6}},
-    {1, 2, {6, 3, 19, 2, 2, 5, 7, 0}},
-    {1, 2, {15, 6, 5, 2, 1, 2, 3, 6}},
-    {1, 4, {18, 4, 8, 2, 2, 3, 4, 0}},
-    {2, 4, {10, 6, 9, 3, 2, 4, 4, 0}},
-    {3, 5, {9, 4, 8, 2, 2, 4, 7, 0}},
-}};
-
-// What a pass over a family needs beside its details. Each thread keeps one, since to get it anew would cost more
-// than to use it.
-class Workspace {
-  public:
-    void start(const Details& d) {
-        const LaneLayout layout(d.shape);
-        if (layout != layout_) {
-            layout_ = layout;
-            for (auto& sizes : sizes_) sizes.assign(layout.places(), 0);
-            nothing_.assign(layout.places(), 0);
-        }
-        edges_.start(d);
-        coded_ = {};
-    }
-    const LaneLayout& layout() const { return layout_; }
-
-    // `tokens_of_band` are layout().groups() times 32. Bands come in the order of kBandOrder.
-    BandPass pass(const Details& d, const Band& band, int base, std::uint8_t* tokens_of_band) {
-        const Role& role = kRoles[std::size_t(band.mask)];
-        const std::size_t origin = layout_.at(0, 0, 0);
-        auto& sizes = sizes_[std::size_t(band.mask)];
-        // A smaller band leaves no sizes of another family where a larger one looks.
-        std::fill(sizes.begin() + std::ptrdiff_t(layout_.at(band.dims.z - 1, 0, -1) + layout_.slice_places()), sizes.end(), std::uint8_t(0));
-        const auto of = [&](int mask) { return (coded_[std::size_t(mask)] ? sizes_[std::size_t(mask)] : nothing_).data() + origin; };
-        BandPass pass;
-        pass.slices = band.dims.z;
-        pass.panels = layout_.panels;
-        pass.rows = layout_.rows;
-        pass.panel_places = std::ptrdiff_t(layout_.panel_places());
-        pass.slice_places = std::ptrdiff_t(layout_.slice_places());
-        pass.sizes = sizes.data() + origin;
-        pass.first = of(role.first);
-        pass.second = of(role.second);
-        pass.edge = role.weights.edge ? edges_.find(d, layout_, std::countr_zero(unsigned(band.mask))) + origin : nothing_.data() + origin;
-        pass.weights = role.weights;
-        pass.active = active_lanes(band);
-        pass.tokens = tokens_of_band;
-        pass.base = base;
-        coded_[std::size_t(band.mask)] = true;
-        return pass;
-    }
-
-    std::vector<std::uint8_t> tokens, contexts, raw;
-    std::vector<std::uint16_t> words;
-    std::vector<std::int32_t> numbers;
-
-    // 255 for each lane of the groups of a slice that the band has; null: all of them.
-    const std::uint8_t* active_lanes(const Band& band) {
-        if (layout_.fills(band)) return nullptr;
-        active_.assign(std::size_t(layout_.panels) * std::size_t(layout_.rows) * kLanes, 0);
-        for (int panel = 0; panel < layout_.panels; ++panel)
-            for (int row = 0; row < layout_.rows; ++row)
-                layout_.each_strip(band, panel, row, [&](int lane, int, int, int count) {
-                    std::fill_n(active_.begin() + (panel * layout_.rows + row) * kLanes + lane, count, std::uint8_t(255));
-                });
-        return active_.data();
-    }
-
-  private:
-    LaneLayout layout_;
-    std::array<std::vector<std::uint8_t>, 8> sizes_;
-    std::vector<std::uint8_t> nothing_, active_;
-    LaneEdges edges_;
-    std::array<bool, 8> coded_{};
-};
-thread_local Workspace workspace;
+thread_local LaneWorkspace workspace;
 
 std::uint32_t folded(std::int32_t q) { return std::uint32_t(q) << 1 ^ (q < 0 ? ~0u : 0u); }
 std::int32_t unfolded(std::uint32_t v) { return std::int32_t(v >> 1 ^ (0u - (v & 1))); }
@@ -128,6 +46,16 @@ bool all_zero(const std::uint8_t* tokens) {
     static_assert(sizeof parts == kLanes);
     std::memcpy(&parts, tokens, sizeof parts);
     return (parts[0] | parts[1] | parts[2] | parts[3]) == 0;
+}
+
+// Has one of 32 tokens the symbol kEscape, whose four bits are all set?
+bool any_escape(const std::uint8_t* tokens) {
+    static_assert(kEscape == 15);
+    std::array<std::uint64_t, kLanes / 8> parts;
+    std::memcpy(parts.data(), tokens, sizeof parts);
+    std::uint64_t any = 0;
+    for (const std::uint64_t p : parts) any |= (p & 0x0f0f0f0f0f0f0f0f) + 0x0101010101010101;
+    return (any & 0x1010101010101010) != 0;
 }
 
 // The bands that have numbers, as flags in kBandOrder, and how many numbers there are.
@@ -155,7 +83,7 @@ void each_coded_band(const Details& d, int flags, const Use& use) {
 }
 
 // A band's numbers as the kernels want them: tokens and contexts appended to the workspace's.
-void choose_band(Workspace& w, const Details& d, const Band& band, int base, const std::uint32_t* usable) {
+void choose_band(LaneWorkspace& w, const Details& d, const Band& band, int base, const std::uint32_t* usable) {
     const LaneLayout& layout = w.layout();
     const std::size_t count = layout.groups(band) * kLanes, at = w.tokens.size();
     w.numbers.assign(count, 0);
@@ -277,7 +205,7 @@ class FastCoder final : public Coder {
             return usable;
         }();
         const Details d = family.details();
-        Workspace& w = workspace;
+        LaneWorkspace& w = workspace;
         w.start(d);
         w.tokens.clear();
         w.contexts.clear();
@@ -291,7 +219,7 @@ class FastCoder final : public Coder {
 
     void encode_lanes(const Details& d, int flags, Bytes& out) const {
         const int base = tables_.base(d.finest);
-        Workspace& w = workspace;
+        LaneWorkspace& w = workspace;
         w.start(d);
         w.tokens.clear();
         w.contexts.clear();
@@ -320,13 +248,7 @@ class FastCoder final : public Coder {
             sink.states[i] = kLowestState | std::uint32_t(bits[2 * i]) | std::uint32_t(bits[2 * i + 1]) << 8;
         for (auto coded = bands.rbegin(); coded != bands.rend(); ++coded) {
             const auto& [band, at] = *coded;
-            BandPass pass;
-            pass.slices = band.dims.z;
-            pass.panels = w.layout().panels;
-            pass.rows = w.layout().rows;
-            pass.active = w.active_lanes(band);
-            pass.tokens = w.tokens.data() + at;
-            encode_tokens(pass, w.contexts.data() + at, tables_.symbols(table_set(d.finest, band.mask)), sink);
+            encode_tokens(w.groups(band, base, w.tokens.data() + at), w.contexts.data() + at, tables_.symbols(table_set(d.finest, band.mask)), sink);
         }
         w.words.resize(std::size_t(sink.at - w.words.data()));
         std::reverse(w.words.begin(), w.words.end());
@@ -376,7 +298,7 @@ class FastCoder final : public Coder {
         read_states(reader, source.states);
         const std::uint64_t words = reader.varint();
         if (words > reader.left() / 2) fail("the data ends too early");
-        Workspace& w = workspace;
+        LaneWorkspace& w = workspace;
         w.words.resize(std::size_t(words) + kWordsBeyond);
         if (words > 0) std::memcpy(w.words.data(), reader.bytes(2 * words).data(), std::size_t(2 * words));
         source.at = w.words.data();
@@ -409,36 +331,41 @@ class FastCoder final : public Coder {
         expand(flags, w, 8 * (kInStates + bits.size()), escapes, d);
     }
 
-    void expand(int flags, Workspace& w, std::uint64_t limit, BitReader& escapes, Details& d) const {
+    void expand(int flags, LaneWorkspace& w, std::uint64_t limit, BitReader& escapes, Details& d) const {
         const int base = tables_.base(d.finest);
-        const LaneLayout& layout = w.layout();
-        const std::uint8_t* tokens = w.tokens.data();
+        std::uint8_t* tokens = w.tokens.data();
         std::uint64_t at = 0;
         for (std::size_t i = 0; i < kBandOrder.size(); ++i) {
             const Band band = d.shape.band(kBandOrder[i]);
-            if (!d.shape.has(band)) continue;
             if (!(flags >> i & 1)) {
                 for_each_row(d, band, [](std::int32_t* q, std::size_t n) { std::fill_n(q, n, 0); });
                 continue;
             }
-            const std::uint8_t* const active = w.active_lanes(band);
-            layout.each_group(band, [&](int z, int panel, int row) {
-                alignas(64) std::array<std::int32_t, kLanes> numbers;
-                if (base == 0 && all_zero(tokens)) {
-                    numbers.fill(0);
-                } else {
-                    expand_group(tokens, active ? active + (panel * layout.rows + row) * kLanes : nullptr, base, w.raw.data(), at,
-                                 numbers.data());
-                    if (at > limit) fail("the data ends too early");
-                    for (std::size_t lane = 0; lane < kLanes; ++lane)
-                        if (tokens[lane] % kSymbols == kEscape) numbers[lane] = escaped(tokens[lane], base, numbers[lane], escapes);
-                }
-                layout.each_strip(band, panel, row, [&](int lane, int x, int y, int n) {
-                    std::copy_n(numbers.data() + lane, n, d.q + d.shape.at(band.lo + glm::ivec3(x, y, z)));
-                });
-                tokens += kLanes;
-            });
+            const std::size_t count = w.layout().groups(band) * kLanes;
+            w.numbers.resize(std::max(w.numbers.size(), count));
+            if (!expand_tokens(w.groups(band, base, tokens), w.raw.data(), limit, at, w.numbers.data())) fail("the data ends too early");
+            for (std::size_t group = 0; group < count; group += kLanes) {
+                if (!any_escape(tokens + group)) continue;
+                for (std::size_t n = group; n < group + kLanes; ++n)
+                    if (tokens[n] % kSymbols == kEscape) w.numbers[n] = escaped(tokens[n], base, w.numbers[n], escapes);
+            }
+            spread(w.layout(), band, w.numbers.data(), d);
+            tokens += count;
         }
+    }
+
+    // From lanes into the family's box.
+    static void spread(const LaneLayout& layout, const Band& band, const std::int32_t* numbers, Details& d) {
+        layout.each_group(band, [&](int z, int panel, int row) {
+            layout.each_strip(band, panel, row, [&](int lane, int x, int y, int n) {
+                std::int32_t* const to = d.q + d.shape.at(band.lo + glm::ivec3(x, y, z));
+                if (n == 16)  // apart, since nearly all are such
+                    std::memcpy(to, numbers + lane, 16 * sizeof *to);
+                else
+                    std::copy_n(numbers + lane, n, to);
+            });
+            numbers += kLanes;
+        });
     }
 
     // `q` is what the token and its bits alone would be.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/byte_io.h"
+#include "core/base/meter.h"
 #include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/passes.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"
@@ -107,6 +108,7 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
     const bool exact = keeps_voxels(tree);
     EncodedFamily result;
     thread_local FamilyCodec::Planes planes;
+    const std::int64_t start = thread_cpu_ns();
     integers_of(tree, original, family, planes);
     Buffer near;
     if (volume.has_mask) result.add_mask(mask_of(original, box_of(tree, family)), box_of(tree, family).dims());
@@ -121,8 +123,10 @@ EncodedFamily encode_fine(const FamilyCodec& codec, const TreeDesc& tree, Family
             decode(kept);
         }
         codec.encode(family, low, planes, result.bytes, FamilyCodec::After::spoiled);
+        result.codec_ns = thread_cpu_ns() - start;
     } else {
         codec.encode(family, low, planes, result.bytes);
+        result.codec_ns = thread_cpu_ns() - start;
         decode(planes);
     }
 

@@ -17,6 +17,7 @@ struct EncodedFamily {
     Bytes bytes;
     std::uint32_t check = 0;
     std::uint64_t patches = 0;
+    std::int64_t codec_ns = 0;     // CPU time of transform, quantiser and coder
     std::vector<MeasuredBrick> bricks;
     std::vector<ErrorSum> coarse;  // as CoarseErrors::measure() gives them
     // Goes before everything else.

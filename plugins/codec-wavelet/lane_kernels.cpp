@@ -326,8 +326,9 @@ HWY_INLINE V bits_at(const std::uint8_t* raw, V bit) {
     return hn::Shr(words, hn::And(bit, hn::Set(d, 7)));
 }
 
-void ExpandGroup(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,
-                 std::uint64_t& at, std::int32_t* numbers) {
+template <bool kRagged>
+HWY_INLINE void expand_group(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,
+                             std::uint64_t& at, std::int32_t* numbers) {
     const D32 d;
     const DI32 di;
     const V one = hn::Set(d, 1), zero = hn::Zero(d);
@@ -336,7 +337,7 @@ void ExpandGroup(const std::uint8_t* tokens, const std::uint8_t* active, int bas
         const V symbol = hn::And(token, hn::Set(d, 15)), shift = hn::Add(hn::ShiftRight<4>(token), hn::Set(d, std::uint32_t(base)));
         const auto plain = hn::Eq(shift, zero);
         V count = hn::IfThenElse(plain, hn::Min(symbol, one), hn::Add(shift, one));
-        if (active) count = hn::IfThenZeroElse(hn::Eq(bytes_at(active + i), zero), count);
+        if (kRagged) count = hn::IfThenZeroElse(hn::Eq(bytes_at(active + i), zero), count);
         const V before = sums_before(count);
         const V bits = hn::And(bits_at(raw + at / 8, hn::Add(before, hn::Set(d, std::uint32_t(at % 8)))),
                                hn::Sub(hn::Shl(one, count), one));
@@ -347,6 +348,28 @@ void ExpandGroup(const std::uint8_t* tokens, const std::uint8_t* active, int bas
         hn::StoreU(hn::Xor(hn::BitCast(di, size), negative), di, numbers + i);
         at += hn::ExtractLane(before, kEach - 1) + hn::ExtractLane(count, kEach - 1);
     }
+}
+
+template <bool kRagged>
+HWY_INLINE bool expand_groups(const BandPass& b, const std::uint8_t* raw, std::uint64_t limit, std::uint64_t& at, std::int32_t* numbers) {
+    const std::size_t in_slice = std::size_t(b.panels) * std::size_t(b.rows), groups = std::size_t(b.slices) * in_slice;
+    std::uint64_t bit = at;
+    for (std::size_t group = 0, row = 0; group < groups; ++group, row = row + 1 == in_slice ? 0 : row + 1) {
+        const std::uint8_t* const tokens = b.tokens + group * kLaneCount;
+        std::array<std::uint64_t, kLaneCount / 8> parts;
+        std::memcpy(parts.data(), tokens, sizeof parts);
+        if (b.base == 0 && (parts[0] | parts[1] | parts[2] | parts[3]) == 0)
+            std::fill_n(numbers + group * kLaneCount, kLaneCount, 0);
+        else
+            expand_group<kRagged>(tokens, kRagged ? b.active + row * kLaneCount : nullptr, b.base, raw, bit, numbers + group * kLaneCount);
+        if (bit > limit) return false;
+    }
+    at = bit;
+    return true;
+}
+
+bool ExpandTokens(const BandPass& band, const std::uint8_t* raw, std::uint64_t limit, std::uint64_t& at, std::int32_t* numbers) {
+    return band.active ? expand_groups<true>(band, raw, limit, at, numbers) : expand_groups<false>(band, raw, limit, at, numbers);
 }
 
 // No more than 2^26, so that sums stay within 32 bits, whatever a corrupt file holds.
@@ -376,7 +399,7 @@ namespace voxloom::wavelet {
 HWY_EXPORT(DecodeTokens);
 HWY_EXPORT(ChooseTokens);
 HWY_EXPORT(EncodeTokens);
-HWY_EXPORT(ExpandGroup);
+HWY_EXPORT(ExpandTokens);
 HWY_EXPORT(FindEdges);
 
 bool decode_tokens(const BandPass& band, const std::uint32_t* slots, SymbolSource& source) {
@@ -388,9 +411,8 @@ void choose_tokens(const BandPass& band, const std::int32_t* numbers, const std:
 void encode_tokens(const BandPass& band, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink) {
     HWY_DYNAMIC_DISPATCH(EncodeTokens)(band, contexts, symbols, sink);
 }
-void expand_group(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,
-                  std::uint64_t& at, std::int32_t* numbers) {
-    HWY_DYNAMIC_DISPATCH(ExpandGroup)(tokens, active, base, raw, at, numbers);
+bool expand_tokens(const BandPass& band, const std::uint8_t* raw, std::uint64_t limit, std::uint64_t& at, std::int32_t* numbers) {
+    return HWY_DYNAMIC_DISPATCH(ExpandTokens)(band, raw, limit, at, numbers);
 }
 void find_edges(const EdgeRow& slopes, int count, int every, float scale, std::uint8_t* edges) {
     HWY_DYNAMIC_DISPATCH(FindEdges)(slopes, count, every, scale, edges);

@@ -62,10 +62,10 @@ struct SymbolSink {
 // from bit 16 on the sum of those before it. Of `band` tokens, active and the number of groups are looked at.
 void encode_tokens(const BandPass& band, const std::uint8_t* contexts, const std::uint32_t* symbols, SymbolSink& sink);
 
-// Numbers of 32 tokens from raw bits that start at bit `at` of `raw`, of which 128 bytes beyond the last bit can be
-// read; `at` moves on. Escapes are left with symbol kEscape.
-void expand_group(const std::uint8_t* tokens, const std::uint8_t* active, int base, const std::uint8_t* raw,
-                  std::uint64_t& at, std::int32_t* numbers);
+// Numbers of a band's tokens from raw bits that start at bit `at` of `raw` and end at bit `limit`, behind which 128 bytes
+// can be read; `at` moves on. False: the bits ended early. Escapes are left with symbol kEscape. Of `band` tokens,
+// active, base and the number of groups are looked at.
+bool expand_tokens(const BandPass& band, const std::uint8_t* raw, std::uint64_t limit, std::uint64_t& at, std::int32_t* numbers);
 
 // One row of lane_edges.h: slopes of the parent modulo 2^32, `every` apart, at a place, before and behind it along its
 // axis, and along the other two.

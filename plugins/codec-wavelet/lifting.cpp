@@ -36,7 +36,7 @@ Shared at_ends(const Ends& shared, int axis) { return {shared.lo[axis], shared.h
 
 // One line along x, from `in` to `out`, which do not overlap.
 template <class T>
-void forward_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared) {
+inline __attribute__((always_inline)) void forward_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared) {
     const int low = (n + 1) / 2, high = n / 2;
     T* s = out;
     T* d = out + low;
@@ -51,7 +51,7 @@ void forward_line(const T* __restrict in, T* __restrict out, int n, T p, Shared 
 }
 
 template <class T>
-void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared, T* __restrict even) {
+inline __attribute__((always_inline)) void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, Shared shared, T* __restrict even) {
     const int low = (n + 1) / 2, high = n / 2;
     const T* s = in;
     const T* d = in + low;
@@ -71,6 +71,22 @@ void inverse_line(const T* __restrict in, T* __restrict out, int n, T p, Shared 
     } else {
         out[n - 1] = even[inner];
     }
+}
+
+// Families of full size, by far the most, have lines of a length that the compiler knows here.
+template <class T>
+void forward_lines(const T* __restrict in, T* __restrict out, int n, T p, Shared shared) {
+    if (n == 32)
+        forward_line(in, out, 32, p, shared);
+    else
+        forward_line(in, out, n, p, shared);
+}
+template <class T>
+void inverse_lines(const T* __restrict in, T* __restrict out, int n, T p, Shared shared, T* __restrict even) {
+    if (n == 32)
+        inverse_line(in, out, 32, p, shared, even);
+    else
+        inverse_line(in, out, n, p, shared, even);
 }
 
 // The same across n rows of `width` samples, so that the inner loops run along the rows.
@@ -150,7 +166,7 @@ void forward(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std:
         T* const out = passes.odd() ? to : box;
         for (std::size_t row = 0; row < passes.all; row += passes.width) {
             std::copy_n(box + row, passes.width, line);
-            forward_line(line, out + row, dims.x, p, at_ends(shared, 0));
+            forward_lines(line, out + row, dims.x, p, at_ends(shared, 0));
         }
         if (passes.odd()) std::swap(from, to);
     }
@@ -186,7 +202,7 @@ void inverse(T* box, glm::ivec3 dims, glm::bvec3 halved, Rounding rounding, std:
     if (passes.x) {
         for (std::size_t row = 0; row < passes.all; row += passes.width) {
             std::copy_n(from + row, passes.width, line);
-            inverse_line(line, box + row, dims.x, p, at_ends(shared, 0), line + passes.width);
+            inverse_lines(line, box + row, dims.x, p, at_ends(shared, 0), line + passes.width);
         }
         return;
     }

@@ -191,11 +191,10 @@ namespace {
 
 // Integers of the tree with `fraction` bits below the unit, halves rounded up.
 template <class T>
-void unfold(const std::int32_t* from, std::size_t count, std::size_t components, int fraction, T lo, T hi, T* out) {
+void unfold(const std::int32_t* from, std::size_t count, std::size_t components, int fraction, std::int32_t lo, std::int32_t hi, T* out) {
     const std::int32_t half = fraction > 0 ? 1 << (fraction - 1) : 0;
-    const auto low = std::int32_t(lo), high = std::int32_t(hi);
     const auto one = [=](std::int32_t v) {
-        return T(std::clamp(std::int32_t(std::uint32_t(v) + std::uint32_t(half)) >> fraction, low, high));
+        return T(std::clamp(std::int32_t(std::uint32_t(v) + std::uint32_t(half)) >> fraction, lo, hi));
     };
     if (components == 1)  // apart, for the compiler's sake
         for (std::size_t i = 0; i < count; ++i) out[i] = one(from[i]);
@@ -203,30 +202,50 @@ void unfold(const std::int32_t* from, std::size_t count, std::size_t components,
         for (std::size_t i = 0; i < count; ++i) out[i * components] = one(from[i]);
 }
 
+// What a voxel can be.
+ValueRange limits_of_voxels(const VolumeDesc& volume) {
+    const auto [lo, hi] = limits_of(volume.type);
+    if (!volume.range) return {lo, hi};
+    return {std::max(lo, volume.range->min), std::min(hi, volume.range->max)};
+}
+
 }  // namespace
+
+bool FamilyCodec::has_small_integers() const {
+    const ScalarType type = tree_.bricks.volume.type;
+    return !is_float(type) && bytes_of(type) <= 2 && tree_.map.shift() >= 0;
+}
 
 void FamilyCodec::to_voxels(const Planes& planes, std::size_t count, std::byte* out) const {
     const VolumeDesc& volume = tree_.bricks.volume;
-    auto [lo, hi] = limits_of(volume.type);
-    if (volume.range) {
-        lo = std::max(lo, volume.range->min);
-        hi = std::min(hi, volume.range->max);
-    }
+    const ValueRange limits = limits_of_voxels(volume);
     const std::size_t components = planes.size();
-    // Small integers take a short cut without floating point.
-    const int fraction = tree_.map.shift();
-    if (!is_float(volume.type) && bytes_of(volume.type) <= 2 && fraction >= 0)
-        return with_type(volume.type, [&, low = lo, high = hi](auto t) {
-            using T = decltype(t);
-            if constexpr (sizeof(T) <= 2)
-                for (std::size_t c = 0; c < components; ++c)
-                    unfold(planes[c].data(), count, components, fraction, T(low), T(high), reinterpret_cast<T*>(out) + c);
+    if (has_small_integers())  // no way through floating point
+        return with_type(volume.type, [&](auto t) {
+            for (std::size_t c = 0; c < components; ++c)
+                unfold(planes[c].data(), count, components, tree_.map.shift(), std::int32_t(limits.min), std::int32_t(limits.max),
+                       reinterpret_cast<decltype(t)*>(out) + c);
         });
     std::vector<double> values(count * components);
     for (std::size_t c = 0; c < components; ++c)
         for (std::size_t i = 0; i < count; ++i)
-            values[i * components + c] = std::clamp(tree_.map.value(planes[c][i]), lo, hi);
+            values[i * components + c] = std::clamp(tree_.map.value(planes[c][i]), limits.min, limits.max);
     from_double(values.data(), values.size(), volume.type, out);
+}
+
+void FamilyCodec::to_brick(const Planes& planes, const Box& box, const Box& part, std::byte* out) const {
+    const ValueRange limits = limits_of_voxels(tree_.bricks.volume);
+    const int fraction = tree_.map.shift();
+    const Index3 n = box.dims(), lo = part.lo - box.lo, count = part.dims();
+    const std::size_t components = planes.size(), row = std::size_t(count.x);
+    with_type(tree_.bricks.tree_type, [&](auto t) {
+        auto* to = reinterpret_cast<decltype(t)*>(out);
+        for (std::int64_t z = 0; z < count.z; ++z)
+            for (std::int64_t y = 0; y < count.y; ++y, to += row * components)
+                for (std::size_t c = 0; c < components; ++c)
+                    unfold(planes[c].data() + ((lo.z + z) * n.y + lo.y + y) * n.x + lo.x, row, components, fraction,
+                           std::int32_t(limits.min), std::int32_t(limits.max), to + c);
+    });
 }
 
 }  // namespace voxloom::wavelet

@@ -87,6 +87,10 @@ class FamilyCodec {
     // Voxels of the volume's type, components interleaved, from the tree's integers; clamped to the
     // volume's range, where it is known, and its type.
     void to_voxels(const Planes& planes, std::size_t count, std::byte* out) const;
+    // The same for the brick `part` of planes of `box`, in tree_type; only for small integers: types of up to 16 bits
+    // whose voxels are the tree's integers, shifted.
+    bool has_small_integers() const;
+    void to_brick(const Planes& planes, const Box& box, const Box& part, std::byte* out) const;
 
   private:
     Details details_of(FamilyId family, const std::vector<std::int32_t>& low, std::int32_t* box) const;

@@ -142,7 +142,8 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
     thread_local Bytes fine;
     planes.resize(components);
     for (auto& plane : planes) plane.resize(count);
-    Buffer voxels;  // above level 0
+    Buffer voxels;       // above level 0
+    bool plain = false;  // at level 0: the planes are all there is to the voxels
     try {
         FamilyCodec::Planes low;
         if (parent) low = parent_planes(tree, *parent);
@@ -151,12 +152,18 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
         if (volume.has_mask) in.block();
         codec.decode(family, low, in, planes);
         if (id.level == 0) {
-            FamilyCodec::crop(planes, box, own);
-            fine.resize(own.voxels() * volume.voxel_bytes());
-            codec.to_voxels(planes, own.voxels(), fine.data());
+            std::span<const std::byte> distances, patches;
             if (in.left() > 0 && !is_nothing(bytes)) {
-                decode_distances(volume.type, in.block(), fine.data(), own.voxels() * components);
-                decode_patches(volume.type, in.bytes(in.left()), fine.data(), own.voxels() * components);
+                distances = in.block();
+                patches = in.bytes(in.left());
+            }
+            plain = codec.has_small_integers() && distances.empty() && patches.empty();
+            if (!plain) {
+                FamilyCodec::crop(planes, box, own);
+                fine.resize(own.voxels() * volume.voxel_bytes());
+                codec.to_voxels(planes, own.voxels(), fine.data());
+                decode_distances(volume.type, distances, fine.data(), own.voxels() * components);
+                decode_patches(volume.type, patches, fine.data(), own.voxels() * components);
             }
         } else {
             voxels = tree_voxels(tree, planes, count);
@@ -173,7 +180,9 @@ std::vector<DecodedBrick> WaveletBricks::refine(BrickId id, const BrickVoxels* p
         const Box part = stored_box(tree, child);
         brick->stored = part.dims();
         brick->voxels = Buffer(part.voxels() * desc().tree_voxel_bytes(), "brick");
-        if (id.level == 0)
+        if (plain)
+            codec.to_brick(planes, box, part, brick->voxels.data());
+        else if (id.level == 0)
             convert_box(part, volume.type, fine.data(), own, desc().tree_type, brick->voxels.data(), part, volume.components);
         else
             copy_box(part, voxels.data(), box, brick->voxels.data(), part, desc().tree_voxel_bytes());
