@@ -174,6 +174,109 @@ TEST(Commands, selectionFollowsUndo) {
     EXPECT_EQ(work.single(), nullptr);
 }
 
+// --- nodes that are not used, and what is written beside them --------------------------------------
+
+TEST(Use, isTurnedOnAndOffForAllThatIsSelected) {
+    Workspace work = workspace_of(kChain);
+    work.selected = {"add", "table"};
+    work.document.set_use({"add"}, GraphNode::Use::disabled);
+    toggle_use(work, GraphNode::Use::disabled);
+    for (const char* id : {"add", "table"}) EXPECT_EQ(work.graph().find(id)->use, GraphNode::Use::disabled) << id;
+    toggle_use(work, GraphNode::Use::bypassed);
+    EXPECT_EQ(work.graph().find("add")->use, GraphNode::Use::bypassed);
+    toggle_use(work, GraphNode::Use::bypassed);
+    EXPECT_EQ(work.graph().find("table")->use, GraphNode::Use::normal);
+    while (work.document.can_undo()) work.document.undo();
+    EXPECT_EQ(work.document.text(), kChain);
+}
+
+TEST(Notes, groupsFollowTheirNodes) {
+    Workspace work = workspace_of(kChain);
+    work.selected = {"source", "add"};
+    group_selected(work, "First, and: #second");
+    work.selected = {"add", "table"};
+    EXPECT_EQ(group_selected(work, "Second"), 1u);
+    auto groups = [&] { return groups_of(Document::parse(work.document.text()).graph()); };
+    ASSERT_EQ(groups().size(), 2u);
+    EXPECT_EQ(groups()[0].title, "First, and: #second");
+    EXPECT_EQ(groups()[0].nodes, std::vector<std::string>{"source"}) << "a node is in one group";
+    rename_node(work, "table", "other");
+    EXPECT_EQ(groups()[1].nodes, (std::vector<std::string>{"add", "other"}));
+    EXPECT_EQ(work.selected, (std::set<std::string>{"add", "other"}));
+    set_title(work, 1, "Renamed");
+    const std::string before = work.document.text();
+    work.selected = {"add", "other"};
+    remove_selected(work);
+    ASSERT_EQ(groups().size(), 1u);
+    EXPECT_THAT(work.document.text(), ::testing::Not(HasSubstr("Renamed"))) << "no trace of a group without nodes";
+    work.document.undo();
+    EXPECT_EQ(work.document.text(), before);
+    work.selected = {"other"};
+    ungroup_selected(work);
+    EXPECT_EQ(groups().size(), 1u);
+    while (work.document.can_undo()) work.document.undo();
+    EXPECT_EQ(work.document.text(), kChain);
+}
+
+TEST(Notes, commentsMoveAndAreCopiedWithNodes) {
+    Workspace work = workspace_of(kChain);
+    arrange(work, registry());
+    EXPECT_EQ(add_comment(work, "look\n\"here\"", {13, -26}), 0u);
+    EXPECT_EQ(comments_of(work.graph())[0].at, glm::dvec2(10, -30));
+    work.selected = {"add", "source"};
+    group_selected(work, "Pair");
+    const auto boxes = boxes_of(work.graph(), ports_of(work.graph(), registry()));
+    const std::string before = work.document.text();
+    move_selected(work, boxes, {100, 0});
+    EXPECT_EQ(comments_of(work.graph())[0].at, glm::dvec2(110, -30));
+    EXPECT_EQ(*work.graph().find("add")->at, boxes[1].at + glm::dvec2(100, 0));
+    work.document.undo();
+    EXPECT_EQ(work.document.text(), before) << "one step";
+
+    work.selected_comments = {0};
+    const std::string copied = copy_selected(work, registry());
+    Workspace other = workspace_of(kChain);
+    paste(other, registry(), copied, {500, 500});
+    ASSERT_EQ(comments_of(other.graph()).size(), 1u);
+    EXPECT_EQ(comments_of(other.graph())[0].text, "look\n\"here\"");
+    EXPECT_EQ(groups_of(other.graph()).at(0).nodes, (std::vector<std::string>{"add-2", "source-2"}));
+    EXPECT_EQ(other.selected_comments, std::set<std::size_t>{0});
+    other.document.undo();
+    EXPECT_EQ(other.document.text(), kChain);
+
+    set_comment(work, 0, "");
+    EXPECT_TRUE(comments_of(work.graph()).empty());
+    work.document.undo();
+    work.selected.clear();
+    work.selected_comments = {0};
+    remove_selected(work);
+    EXPECT_TRUE(comments_of(work.graph()).empty());
+}
+
+TEST(Notes, boxesOfGroupsHoldTheirNodes) {
+    Workspace work = workspace_of(kChain);
+    work.selected = {"source", "table"};
+    group_selected(work, "Ends");
+    const auto nodes = boxes_of(work.graph(), ports_of(work.graph(), registry()));
+    const NodeBox box = boxes_of_groups(groups_of(work.graph()), work.graph(), nodes).at(0);
+    for (std::size_t i : {0, 2}) {
+        EXPECT_LT(box.at.x, nodes[i].at.x);
+        EXPECT_LE(box.at.y + kGroupTitle, nodes[i].at.y);
+        EXPECT_GT(box.at.x + box.size.x, nodes[i].at.x + nodes[i].size.x);
+        EXPECT_GT(box.at.y + box.size.y, nodes[i].at.y + nodes[i].size.y);
+    }
+}
+
+TEST(Notes, whatIsNotUnderstoodIsLeftOut) {
+    const Graph graph = Document::parse("voxloom: 1\nnodes: [{ id: a, type: t }]\neditor: { groups: [7, [x], [[y], a], [t, b], [u, a, a]], "
+                                        "comments: [[c, 1], [c, x, 1], [c, .inf, 1], [d, 1, 2]], later: [1] }\n").graph();
+    ASSERT_EQ(groups_of(graph).size(), 1u);
+    EXPECT_EQ(groups_of(graph)[0].title, "u");
+    EXPECT_EQ(groups_of(graph)[0].nodes, std::vector<std::string>{"a"});
+    ASSERT_EQ(comments_of(graph).size(), 1u);
+    EXPECT_EQ(comments_of(graph)[0].text, "d");
+}
+
 // --- layout --------------------------------------------------------------------------------------
 
 TEST(Layout, nothingOverlapsAndSourcesStandLeft) {
@@ -413,7 +516,7 @@ void random_edit(Workspace& work, std::mt19937& random) {
     const auto& nodes = work.graph().nodes;
     auto some = [&] { return nodes[pick(nodes.size())].id; };
     const double x = double(pick(2000)) / 8;
-    const std::size_t kind = nodes.size() < 3 ? 0 : pick(nodes.size() > 5 ? 12 : 10);
+    const std::size_t kind = nodes.size() < 3 ? 0 : pick(nodes.size() > 5 ? 16 : 14);
     switch (kind) {
         case 0: add_node(work, registry(), type(pick(2) ? "fake.add" : "fake.sum"), {x, x}); break;
         case 1: connect(work, registry(), {some(), "volume", {}}, {some(), "volume", {}}); break;
@@ -424,6 +527,13 @@ void random_edit(Workspace& work, std::mt19937& random) {
         case 6: work.document.rename_node(some(), "n" + std::to_string(pick(40))); break;
         case 7: set_output(work, {some(), "volume", {}}, pick(2)); break;
         case 8: work.document.disconnect(some(), "volume"); break;
+        case 10: work.document.set_use({some(), some()}, GraphNode::Use(pick(3))); break;
+        case 11:
+            work.selected = {some(), some()};
+            pick(3) ? void(group_selected(work, "Group " + std::to_string(pick(9)))) : ungroup_selected(work);
+            break;
+        case 12: pick(3) ? void(add_comment(work, "text: '" + std::to_string(pick(9)), {x, x})) : set_comments(work.document, {}); break;
+        case 13: rename_node(work, some(), "g" + std::to_string(pick(40))); break;
         case 9:
             work.selected = {some()};
             paste(work, registry(), copy_selected(work, registry()), {x, x});

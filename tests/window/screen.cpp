@@ -181,6 +181,13 @@ void EditorProcess::click(const std::string& item, double x, double y) {
     release();
 }
 
+void EditorProcess::press_with(const std::string& modifier, const std::string& item) {
+    xdotool("keydown " + modifier);
+    click(item);
+    xdotool("keyup " + modifier);
+    pause();
+}
+
 void EditorProcess::drag(const std::string& from, const std::string& to) {
     move_to(from);
     press();

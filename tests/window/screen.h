@@ -47,6 +47,7 @@ class EditorProcess {
     void press(int button = 1);
     void release(int button = 1);
     void click(const std::string& item, double x = 0.5, double y = 0.5);
+    void press_with(const std::string& modifier, const std::string& item);  // a click while a key is held
     void drag(const std::string& from, const std::string& to);
     void key(const std::string& key, const std::string& modifier = "");
     void type(const std::string& text);

@@ -118,6 +118,58 @@ TEST_F(Window, aGraphIsOpenedTunedUndoneSavedAndRunsToTheSamePicture) {
     EXPECT_EQ(editor.wait(), 0);
 }
 
+TEST_F(Window, nodesAreBypassedDisabledGroupedAndCommentedOn) {
+    std::string text = kGraph;
+    text.replace(text.find("source: head.volume, transfer"), 19, "source: code.bricks");
+    text += "  - id: code\n    type: wavelet.encode\n    in:  { volume: head.volume }\n    at: [220, 0]\n";
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    editor.click("node:code");
+    editor.key("b");
+    json s = editor.wait_for("the picture without the codec", [](const json& now) {
+        return now["text"].get<std::string>().find("use: bypassed") != std::string::npos && shows_final(now, "view.image");
+    });
+    EXPECT_EQ(s["problems"], 0);
+    EXPECT_EQ(s["states"]["code"], "not asked");
+    editor.click("node:tf");
+    editor.key("d");
+    s = editor.wait_for("what is left", [](const json& now) { return !now["busy"].get<bool>() && now["states"]["view"] == "not asked"; });
+    EXPECT_EQ(s["problems"], 1) << "the graph is run for nothing but the picture";
+    keep(editor.screenshot(), "disabled");
+    editor.click("node:view");
+    editor.click("action:bypass");
+    s = editor.wait_for("a problem", [](const json& now) { return now["states"]["view"] == "failed"; });
+    for (int i = 0; i < 3; ++i) editor.key("z", "ctrl");
+    s = editor.wait_for("undo", [&](const json& now) { return now["text"] == text && shows_final(now, "view.image"); });
+
+    editor.click("node:tf");
+    editor.press_with("shift", "node:camera");
+    editor.key("g");
+    editor.with("note");
+    editor.type("Scene");
+    editor.key("Return");
+    editor.wait_for("a group", [](const json& now) { return now["text"].get<std::string>().find("groups: [[Scene, camera, tf]]") != std::string::npos; });
+    editor.move_to("canvas", 0.3, 0.9);
+    editor.key("n");
+    editor.with("note");
+    editor.type("Materials of a head.");
+    editor.key("Return");
+    editor.wait_for("a comment", [](const json& now) { return now["text"].get<std::string>().find("\"Materials of a head.\"") != std::string::npos; });
+    // The title takes the nodes along, and they are one step.
+    const std::string before = editor.idle()["text"];
+    editor.drag("group:0", "comment:0");
+    s = editor.wait_for("a move", [&](const json& now) { return now["text"] != before; });
+    const Graph moved = Document::parse(s["text"]).graph();
+    EXPECT_NE(*moved.find("tf")->at, glm::dvec2(220, 120));
+    EXPECT_EQ(*moved.find("camera")->at - *moved.find("tf")->at, glm::dvec2(0, 120));
+    EXPECT_EQ(*moved.find("view")->at, glm::dvec2(480, 0));
+    keep(editor.screenshot(), "notes");
+    for (int i = 0; i < 5; ++i) editor.key("z", "ctrl");
+    EXPECT_EQ(editor.idle()["text"], text);
+}
+
 TEST_F(Window, aWrongWireIsRefusedWithItsReason) {
     VirtualDisplay display(1280, 720);
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});

@@ -27,13 +27,6 @@ bool takes_many(const Graph& graph, const Registry& registry, const WireEnd& to)
     return port && port->many;
 }
 
-// What a graph of these nodes says, written as the document would write it.
-std::string text_of(const std::vector<GraphNode>& nodes) {
-    Document document;
-    document.add_nodes(nodes);
-    return document.text();
-}
-
 }  // namespace
 
 std::string fresh_id(const Graph& graph, std::string_view wanted) {
@@ -108,8 +101,36 @@ bool insert_on_wire(Workspace& workspace, const Registry& registry, const std::s
 }
 
 void remove_selected(Workspace& workspace) {
+    std::vector<Comment> comments = comments_of(workspace.graph());
+    for (auto i = workspace.selected_comments.rbegin(); i != workspace.selected_comments.rend(); ++i)
+        if (*i < comments.size()) comments.erase(comments.begin() + std::ptrdiff_t(*i));
+    Document::Step step(workspace.document);
     workspace.document.remove_nodes({workspace.selected.begin(), workspace.selected.end()});
+    set_groups(workspace.document, groups_of(workspace.graph()));
+    set_comments(workspace.document, comments);
     workspace.selected.clear();
+    workspace.selected_comments.clear();
+}
+
+void toggle_use(Workspace& workspace, GraphNode::Use use) {
+    const bool all = std::ranges::all_of(workspace.selected, [&](const std::string& id) {
+        const GraphNode* node = workspace.graph().find(id);
+        return node && node->use == use;
+    });
+    workspace.document.set_use({workspace.selected.begin(), workspace.selected.end()}, all ? GraphNode::Use::normal : use);
+}
+
+void move_selected(Workspace& workspace, const std::vector<NodeBox>& boxes, glm::dvec2 by) {
+    std::vector<std::pair<std::string, glm::dvec2>> places;
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+        if (const std::string& id = workspace.graph().nodes[i].id; workspace.selected.count(id))
+            places.emplace_back(id, snapped(boxes[i].at + by));
+    std::vector<Comment> comments = comments_of(workspace.graph());
+    for (std::size_t i : workspace.selected_comments)
+        if (i < comments.size()) comments[i].at = snapped(comments[i].at + by);
+    Document::Step step(workspace.document);
+    workspace.document.move_nodes(places);
+    if (!workspace.selected_comments.empty()) set_comments(workspace.document, comments);
 }
 
 void arrange(Workspace& workspace, const Registry& registry) {
@@ -149,7 +170,20 @@ std::string copy_selected(const Workspace& workspace, const Registry& registry) 
         std::erase_if(node.inputs, [](const GraphInput& input) { return input.from.empty(); });
         nodes.push_back(std::move(node));
     }
-    return nodes.empty() ? std::string() : text_of(nodes);
+    const std::vector<Comment> all = comments_of(workspace.graph());
+    std::vector<Comment> comments;
+    for (std::size_t i : workspace.selected_comments)
+        if (i < all.size()) comments.push_back(all[i]);
+    if (nodes.empty() && comments.empty()) return {};
+    std::vector<Group> groups = groups_of(workspace.graph());
+    std::erase_if(groups, [&](const Group& group) {
+        return !std::ranges::all_of(group.nodes, [&](const std::string& id) { return workspace.selected.count(id) > 0; });
+    });
+    Document document;
+    document.add_nodes(nodes);
+    set_groups(document, groups);
+    set_comments(document, comments);
+    return document.text();
 }
 
 void paste(Workspace& workspace, const Registry& registry, const std::string& text, glm::dvec2 at) {
@@ -159,10 +193,13 @@ void paste(Workspace& workspace, const Registry& registry, const std::string& te
     } catch (const Error&) {
         fail("the clipboard holds no nodes; copy some with Ctrl+C, or the text of a graph");
     }
-    if (pasted.nodes.empty()) return;
+    std::vector<Comment> comments = comments_of(workspace.graph()), pasted_comments = comments_of(pasted);
+    std::vector<Group> groups = groups_of(workspace.graph()), pasted_groups = groups_of(pasted);
+    if (pasted.nodes.empty() && pasted_comments.empty()) return;
     const auto boxes = boxes_of(pasted, ports_of(pasted, registry));
-    glm::dvec2 lo = boxes.front().at;
+    glm::dvec2 lo(1e300);
     for (const NodeBox& box : boxes) lo = glm::min(lo, box.at);
+    for (const Comment& comment : pasted_comments) lo = glm::min(lo, comment.at);
 
     std::map<std::string, std::string> renamed;
     Graph taken = workspace.graph();
@@ -181,9 +218,21 @@ void paste(Workspace& workspace, const Registry& registry, const std::string& te
         }
         std::erase_if(node.inputs, [](const GraphInput& input) { return input.from.empty(); });
     }
-    workspace.document.add_nodes(pasted.nodes);
+    for (Group& group : pasted_groups) {
+        for (std::string& id : group.nodes) id = renamed[id];
+        groups.push_back(std::move(group));
+    }
     workspace.selected.clear();
+    workspace.selected_comments.clear();
+    for (Comment& comment : pasted_comments) {
+        workspace.selected_comments.insert(comments.size());
+        comments.push_back({comment.text, snapped(at + comment.at - lo)});
+    }
     for (const GraphNode& node : pasted.nodes) workspace.selected.insert(node.id);
+    Document::Step step(workspace.document);
+    workspace.document.add_nodes(pasted.nodes);
+    set_groups(workspace.document, groups);
+    set_comments(workspace.document, comments);
 }
 
 bool is_output(const Graph& graph, const WireEnd& port) {

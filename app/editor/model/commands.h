@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "app/editor/model/layout.h"
+#include "app/editor/model/notes.h"
 #include "app/editor/model/workspace.h"
 
 namespace voxloom::editor {
@@ -29,15 +30,21 @@ std::string add_before(Workspace& workspace, const Registry& registry, const Fit
 bool insert_on_wire(Workspace& workspace, const Registry& registry, const std::string& id,
                     const WireEnd& from, const WireEnd& to);
 
+// With the selected comments.
 void remove_selected(Workspace& workspace);
+// The selected nodes become this; they become normal where all of them are this already.
+void toggle_use(Workspace& workspace, GraphNode::Use use);
+// Selected nodes and comments, by so much; `boxes` say where nodes are that the document has no place for.
+void move_selected(Workspace& workspace, const std::vector<NodeBox>& boxes, glm::dvec2 by);
 // Every node where auto_layout() puts it.
 void arrange(Workspace& workspace, const Registry& registry);
 // The selected nodes, one below the other, left edges aligned.
 void align_selected(Workspace& workspace, const Registry& registry);
 
-// The selected nodes as a graph of their own, with the wires between them.
+// The selected nodes and comments as a graph of their own, with the wires between them, and with the
+// groups that are selected as a whole.
 std::string copy_selected(const Workspace& workspace, const Registry& registry);
-// Adds the nodes of such a text around `at`, under ids that are free, and selects them.
+// Adds what such a text holds around `at`, under ids that are free, and selects it.
 void paste(Workspace& workspace, const Registry& registry, const std::string& text, glm::dvec2 at);
 
 // Whether NODE.PORT is among the graph's outputs, and the change of that.

@@ -187,8 +187,8 @@ void Evaluator::publish(const Plan& plan, const Request& request) {
     for (const Plan::Node& node : plan.nodes) {
         NodeStatus& status = state_.nodes[node.id];
         if (node.ok || status.state == NodeState::failed) continue;
-        status.state = NodeState::not_run;
-        status.message = "something that it needs has a problem";
+        status.state = node.off.empty() ? NodeState::not_run : NodeState::not_asked;
+        status.message = node.off.empty() ? "something that it needs has a problem" : node.off;
     }
     std::erase_if(state_.values, [&](const auto& entry) {
         return plan.find(std::string_view(entry.first).substr(0, entry.first.find('.'))) < 0;

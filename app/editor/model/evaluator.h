@@ -27,7 +27,7 @@ struct NodeStatus {
     double fraction = -1;      // of a running node, 0 to 1; negative while unknown
     double seconds_left = -1;
     std::string what;          // it is doing
-    std::string message;       // the sentence of a failure or of the check
+    std::string message;       // the sentence of a failure or of the check, or why the node is off
     std::vector<std::string> warnings;
     double wall_seconds = 0;
     std::uint64_t bytes = 0;   // of its outputs

@@ -52,6 +52,7 @@ void save_workspace(Workspace& workspace, const fs::path& file, const Registry& 
 
 void forget_missing(Workspace& workspace) {
     std::erase_if(workspace.selected, [&](const std::string& id) { return !workspace.graph().find(id); });
+    workspace.selected_comments.clear();  // their numbers may be those of others now
 }
 
 }  // namespace voxloom::editor

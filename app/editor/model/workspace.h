@@ -15,6 +15,7 @@ struct Workspace {
     std::filesystem::path file;      // empty: never saved
     std::string saved_text;          // what the file holds
     std::set<std::string> selected;  // ids of nodes
+    std::set<std::size_t> selected_comments;  // by index of comments_of()
 
     Workspace() : saved_text(document.text()) {}
     const Graph& graph() const { return document.graph(); }

@@ -3,6 +3,7 @@
 #include <GLFW/glfw3.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cassert>
 
 #include "app/editor/model/camera_control.h"
@@ -11,7 +12,8 @@ namespace voxloom::editor {
 
 namespace {
 
-bool has_selection(const Editor& e) { return !e.work.selected.empty(); }
+bool has_selection(const Editor& e) { return !e.work.selected.empty() || !e.work.selected_comments.empty(); }
+bool has_selected_nodes(const Editor& e) { return !e.work.selected.empty(); }
 bool has_nodes(const Editor& e) { return !e.work.graph().nodes.empty(); }
 
 void undo(Editor& e) {
@@ -60,6 +62,22 @@ void cut(Editor& e) {
 
 void select_all(Editor& e) {
     for (const GraphNode& node : e.work.graph().nodes) e.work.selected.insert(node.id);
+    for (std::size_t i = 0; i < comments_of(e.work.graph()).size(); ++i) e.work.selected_comments.insert(i);
+}
+
+void group(Editor& e) {
+    edit(e, [&] { open_note(e, NoteEditor::Kind::group, group_selected(e.work, "Group")); });
+}
+
+void comment(Editor& e) {
+    edit(e, [&] { open_note(e, NoteEditor::Kind::comment, add_comment(e.work, "Comment", pointer_on_canvas(e))); });
+    e.note.text.clear();  // what stays empty is removed
+    e.start_page = false;
+}
+
+template <GraphNode::Use use>
+void toggle(Editor& e) {
+    edit(e, [&] { toggle_use(e.work, use); });
 }
 
 void rescale(Editor& e, double factor) {
@@ -123,6 +141,19 @@ std::vector<Action> make_actions() {
         {"align", "Canvas", "Align", "Puts the selected nodes below each other.", GLFW_KEY_A, false, true,
          [](E& e) { edit(e, [&e] { align_selected(e.work, e.registry); }); },
          [](const E& e) { return e.work.selected.size() > 1; }},
+        {"bypass", "Canvas", "Bypass", "The selected nodes pass on what comes in, and do not run; again, and they do.", GLFW_KEY_B, false, false,
+         toggle<GraphNode::Use::bypassed>, has_selected_nodes},
+        {"disable", "Canvas", "Disable", "Takes the selected nodes out of the graph, with all that needs them, without removing them; again, and they are back.",
+         GLFW_KEY_D, false, false, toggle<GraphNode::Use::disabled>, has_selected_nodes},
+        {"group", "Canvas", "Group", "Makes a group with a title of the selected nodes.", GLFW_KEY_G, false, false, group, has_selected_nodes},
+        {"ungroup", "Canvas", "Ungroup", "Takes the group away that the selected nodes are in; the nodes stay.", GLFW_KEY_G, false, true,
+         [](E& e) { edit(e, [&e] { ungroup_selected(e.work); }); },
+         [](const E& e) {
+             return std::ranges::any_of(e.canvas.groups, [&](const Group& g) {
+                 return std::ranges::any_of(g.nodes, [&](const std::string& id) { return e.work.selected.count(id) > 0; });
+             });
+         }},
+        {"comment", "Canvas", "Comment", "Writes a comment at the pointer.", GLFW_KEY_N, false, false, comment},
         {"write", "Run", "Write files", "Runs the nodes that write files; their files go to the output folder.", GLFW_KEY_F5, false, false,
          [](E& e) { write_files(e); }, has_nodes},
         {"stop", "Run", "Stop", "Stops what is running.", GLFW_KEY_ESCAPE, false, false,

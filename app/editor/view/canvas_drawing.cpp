@@ -15,23 +15,6 @@ namespace {
 // Below this zoom names cannot be read and are left out.
 constexpr double kReadable = 0.38;
 
-struct Pen {
-    ImDrawList& list;
-    const Canvas& canvas;
-    double zoom;  // pixels a canvas unit
-
-    explicit Pen(const Canvas& c) : list(*ImGui::GetWindowDrawList()), canvas(c), zoom(c.zoom * double(theme().scale)) {}
-    float px(double units) const { return float(units * zoom); }
-    ImVec2 at(glm::dvec2 p) const { return im(canvas.to_screen(p)); }
-    float font_size() const { return px(13); }
-    void text(glm::dvec2 p, ImU32 color, const std::string& s, double width) const {
-        if (canvas.zoom < kReadable) return;
-        const std::string cut = shortened(s, px(width), theme().body, font_size());
-        list.AddText(theme().body, font_size(), at(p), color, cut.c_str());
-    }
-    float width_of(const std::string& s) const { return theme().body->CalcTextSizeA(font_size(), FLT_MAX, 0, s.c_str()).x; }
-};
-
 void draw_grid(const Pen& pen, glm::dvec2 lo, glm::dvec2 size) {
     double step = 40;
     while (step * pen.zoom < 24) step *= 4;
@@ -57,7 +40,7 @@ void shape_curve(Wire& w) {
 
 std::string footer_text(const NodeStatus& s) {
     switch (s.state) {
-        case NodeState::not_asked: return "";
+        case NodeState::not_asked: return s.message.empty() ? "" : "off";
         case NodeState::waiting: return "stale";
         case NodeState::running: {
             if (s.fraction < 0) return "running";
@@ -83,8 +66,8 @@ void draw_port(const Pen& pen, glm::dvec2 at, const PortSpec& port, const NodePo
                 break;
             }
     const float radius = std::max(pen.px(4.5), 1.5f);
-    pen.list.AddCircleFilled(pen.at(at), radius, wired || output ? color : theme().node, 12);
-    pen.list.AddCircle(pen.at(at), radius, color, 12, std::max(pen.px(1.5), 1.f));
+    pen.list.AddCircleFilled(pen.at(at), radius, pen.color(wired || output ? color : theme().node), 12);
+    pen.list.AddCircle(pen.at(at), radius, pen.color(color), 12, std::max(pen.px(1.5), 1.f));
     // Optional inputs are quieter; what must be wired is not.
     const ImU32 text = wired || output || !port.optional ? theme().text : theme().muted;
     if (!output) return pen.text(at + glm::dvec2(10, -8), text, port.key, kNodeWidth * 0.52);
@@ -93,26 +76,40 @@ void draw_port(const Pen& pen, glm::dvec2 at, const PortSpec& port, const NodePo
     pen.text(at - glm::dvec2(10 + width, 8), text, port.key, room + 1);
 }
 
-void draw_node(const Pen& pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
+// A line straight through the node, where it passes what comes in on; a cross where it is taken away.
+void draw_use(const Pen& pen, const GraphNode& node, const NodePorts& ports, const NodeBox& box) {
+    const float width = std::max(pen.px(2), 1.f);
+    if (node.use == GraphNode::Use::bypassed && !ports.inputs.empty() && !ports.outputs.empty()) {
+        const glm::dvec2 from = box.input(0), to = box.output(0), reach(box.size.x * 0.4, 0);
+        pen.list.AddBezierCubic(pen.at(from), pen.at(from + reach), pen.at(to - reach), pen.at(to), theme().warn, width);
+    } else if (node.use == GraphNode::Use::disabled) {
+        const glm::dvec2 hi = box.at + box.size;
+        pen.list.AddLine(pen.at({box.at.x, box.at.y + kHeaderHeight}), pen.at(hi), theme().muted, width);
+        pen.list.AddLine(pen.at({hi.x, box.at.y + kHeaderHeight}), pen.at({box.at.x, hi.y}), theme().muted, width);
+    }
+}
+
+void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
     const Theme& t = theme();
     const GraphNode& node = editor.work.graph().nodes[i];
     const NodePorts& ports = editor.canvas.ports[i];
     NodeBox box = editor.canvas.boxes[i];
     box.at += moved;
+    if (!pen.sees(box)) return;
     const ImVec2 lo = pen.at(box.at), hi = pen.at(box.at + box.size);
-    const glm::dvec2 clip = editor.canvas.lo + editor.canvas.size;
-    if (hi.x < editor.canvas.lo.x || hi.y < editor.canvas.lo.y || lo.x > clip.x || lo.y > clip.y) return;
     const float round = pen.px(6);
     const bool selected = editor.work.selected.count(node.id) > 0;
     const NodeStatus* status = status_of(editor, node.id);
 
-    pen.list.AddRectFilled({lo.x + pen.px(2), lo.y + pen.px(3)}, {hi.x + pen.px(2), hi.y + pen.px(3)}, IM_COL32(0, 0, 0, t.dark ? 70 : 28), round);
-    pen.list.AddRectFilled(lo, hi, t.node, round);
-    pen.list.AddRectFilled(lo, {hi.x, lo.y + pen.px(kHeaderHeight)}, t.header, round, ImDrawFlags_RoundCornersTop);
+    const bool used = node.use == GraphNode::Use::normal;
+    if (!used || (status && status->state == NodeState::not_asked && !status->message.empty())) pen.alpha = 0.5f;
+    pen.list.AddRectFilled({lo.x + pen.px(2), lo.y + pen.px(3)}, {hi.x + pen.px(2), hi.y + pen.px(3)}, pen.color(IM_COL32(0, 0, 0, t.dark ? 70 : 28)), round);
+    pen.list.AddRectFilled(lo, hi, pen.color(t.node), round);
+    pen.list.AddRectFilled(lo, {hi.x, lo.y + pen.px(kHeaderHeight)}, pen.color(t.header), round, ImDrawFlags_RoundCornersTop);
     pen.text(box.at + glm::dvec2(12, 5), ports.type ? t.text : t.bad, node.id, kNodeWidth - 40);
     if (status) {
         const ImVec2 dot = pen.at(box.at + glm::dvec2(kNodeWidth - 14, kHeaderHeight / 2));
-        if (status->state == NodeState::not_asked) pen.list.AddCircle(dot, pen.px(4), t.muted, 12);
+        if (status->state == NodeState::not_asked) pen.list.AddCircle(dot, pen.px(4), pen.color(t.muted), 12);
         else pen.list.AddCircleFilled(dot, pen.px(4), color_of(status->state), 12);
     }
     auto wired = [&](const std::string& key) {
@@ -128,8 +125,10 @@ void draw_node(const Pen& pen, Editor& editor, std::size_t i, glm::dvec2 moved) 
             pen.list.AddRectFilled({lo.x, hi.y - pen.px(3)}, {end, hi.y}, t.accent);
         }
         const ImU32 color = status->state == NodeState::failed ? t.bad : status->state == NodeState::running ? t.accent : t.muted;
-        pen.text({box.at.x + 12, foot + 2}, color, footer_text(*status), kNodeWidth - 24);
+        const bool off = !used && status->state == NodeState::not_asked;
+        pen.text({box.at.x + 12, foot + 2}, color, off ? std::string(name_of(node.use)) : footer_text(*status), kNodeWidth - 24);
     }
+    draw_use(pen, node, ports, box);
     const bool failed = status && status->state == NodeState::failed;
     pen.list.AddRect(lo, hi, selected ? t.accent : failed ? t.bad : t.border, round, 0, selected ? std::max(pen.px(2), 1.5f) : 1.f);
 }
@@ -137,12 +136,8 @@ void draw_node(const Pen& pen, Editor& editor, std::size_t i, glm::dvec2 moved) 
 // The whole graph, small, with what is seen of it; only where not all of it is seen.
 void draw_minimap(Editor& editor) {
     Canvas& canvas = editor.canvas;
-    if (canvas.boxes.empty()) return;
-    glm::dvec2 lo = canvas.boxes[0].at, hi = lo;
-    for (const NodeBox& box : canvas.boxes) {
-        lo = glm::min(lo, box.at);
-        hi = glm::max(hi, box.at + box.size);
-    }
+    if (canvas.boxes.empty() && canvas.comment_boxes.empty()) return;
+    const auto [lo, hi] = bounds_of(canvas);
     const glm::dvec2 seen_lo = canvas.pan, seen_hi = canvas.to_canvas(canvas.lo + canvas.size);
     if (glm::all(glm::lessThanEqual(seen_lo, lo)) && glm::all(glm::greaterThanEqual(seen_hi, hi))) return;
     const glm::dvec2 all_lo = glm::min(lo, seen_lo), all_hi = glm::max(hi, seen_hi);
@@ -163,6 +158,33 @@ void draw_minimap(Editor& editor) {
 }
 
 }  // namespace
+
+Pen::Pen(const Canvas& c) : list(*ImGui::GetWindowDrawList()), canvas(c), zoom(c.zoom * double(theme().scale)) {}
+
+bool Pen::readable() const { return canvas.zoom >= kReadable; }
+
+bool Pen::sees(const NodeBox& box) const {
+    const glm::dvec2 a = canvas.to_screen(box.at), b = canvas.to_screen(box.at + box.size), end = canvas.lo + canvas.size;
+    return b.x >= canvas.lo.x && b.y >= canvas.lo.y && a.x <= end.x && a.y <= end.y;
+}
+
+void Pen::text(glm::dvec2 p, ImU32 c, const std::string& s, double width) const {
+    if (!readable()) return;
+    const std::string cut = shortened(s, px(width), theme().body, font_size());
+    list.AddText(theme().body, font_size(), at(p), color(c), cut.c_str());
+}
+
+float Pen::width_of(const std::string& s) const { return theme().body->CalcTextSizeA(font_size(), FLT_MAX, 0, s.c_str()).x; }
+
+std::pair<glm::dvec2, glm::dvec2> bounds_of(const Canvas& canvas) {
+    glm::dvec2 lo(1e300), hi(-1e300);
+    for (const auto* boxes : {&canvas.boxes, &canvas.group_boxes, &canvas.comment_boxes})
+        for (const NodeBox& box : *boxes) {
+            lo = glm::min(lo, box.at);
+            hi = glm::max(hi, box.at + box.size);
+        }
+    return {lo, hi};
+}
 
 std::vector<Wire> wires_of(const Editor& editor) {
     const Canvas& canvas = editor.canvas;
@@ -232,6 +254,7 @@ void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire
     pen.list.PushClipRect(lo, hi, true);
     pen.list.AddRectFilled(lo, hi, t.canvas);
     draw_grid(pen, canvas.lo, canvas.size);
+    draw_notes(pen, editor);
     for (std::size_t i = 0; i < wires.size(); ++i) {
         const bool strong = int(i) == hovered_wire || editor.work.selected.count(wires[i].from.node) || editor.work.selected.count(wires[i].to.node);
         draw_wire(pen, wires[i], std::max(pen.px(strong ? 3 : 2), 1.f), strong ? 1.f : 0.65f);
@@ -267,7 +290,7 @@ void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire
     }
     draw_minimap(editor);
     pen.list.PopClipRect();
-    if (canvas.boxes.empty() && !editor.start_page) {
+    if (canvas.boxes.empty() && canvas.comments.empty() && !editor.start_page) {
         const char* hint = "Tab, or a double click, adds a node.  F1 shows everything else.";
         const ImVec2 size = ImGui::CalcTextSize(hint);
         pen.list.AddText({(lo.x + hi.x - size.x) / 2, (lo.y + hi.y - size.y) / 2}, t.muted, hint);

@@ -320,6 +320,7 @@ void draw_help(Editor& editor) {
         {"Wheel on the picture", "Zooms the camera; with Ctrl, magnifies the picture."},
         {"Pictures' list, upper right", "Compares: two, four, wiped, in turns, their difference."},
         {"Drop a node on a wire", "Puts it into the wire."},
+        {"Drag a group's title", "Moves its nodes and the comments in it; double click changes it."},
         {"Alt+click a wire", "Removes it."},
         {"Ctrl+click a slider", "Types a number."},
         {"Right click a parameter's name", "Resets it, or copies it as --set."},

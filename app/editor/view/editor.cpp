@@ -171,11 +171,13 @@ glm::ivec2 whole_size(const Editor& editor, const WireEnd& port, glm::ivec2 othe
 
 namespace {
 
-// Where nodes stand changes no result.
+// Where nodes stand and what is written beside them changes no result.
 bool same_results(const Graph& a, const Graph& b) {
     Graph x = a, y = b;
-    for (GraphNode& node : x.nodes) node.at.reset();
-    for (GraphNode& node : y.nodes) node.at.reset();
+    for (Graph* graph : {&x, &y}) {
+        for (GraphNode& node : graph->nodes) node.at.reset();
+        graph->editor.clear();
+    }
     return x.file == y.file && same_content(x, y);
 }
 
@@ -282,6 +284,7 @@ void draw(Editor& editor) {
     splitter(editor, "split:y", false, {x + gap, y}, {size.x, y + gap}, top, bottom - top, editor.split_y);
     if (editor.start_page) draw_start_page(editor);
     draw_add_menu(editor);
+    draw_note_editor(editor);
     draw_dialogs(editor);
     if (editor.show_help) draw_help(editor);
     draw_message(editor);

@@ -36,7 +36,9 @@ struct Canvas {
     // The document's ports and boxes, made anew when its text has changed.
     std::string text = "-";
     std::vector<NodePorts> ports;
-    std::vector<NodeBox> boxes;
+    std::vector<Group> groups;
+    std::vector<Comment> comments;
+    std::vector<NodeBox> boxes, group_boxes, comment_boxes;
 
     glm::dvec2 to_screen(glm::dvec2 p) const { return lo + (p - pan) * zoom * double(theme().scale); }
     glm::dvec2 to_canvas(glm::dvec2 p) const { return pan + (p - lo) / (zoom * double(theme().scale)); }
@@ -93,6 +95,15 @@ struct TransferEditor {
     int dragged = -1, chosen = -1;
 };
 
+// The title or the comment that is typed.
+struct NoteEditor {
+    enum class Kind { none, group, comment };
+    Kind kind = Kind::none;
+    std::size_t index = 0;
+    std::string text;
+    bool opened = false;
+};
+
 // A thing on the screen with a name, for tests and other programs that look for it.
 struct Mark {
     std::string name;
@@ -117,6 +128,7 @@ struct Editor {
     AddMenu add;
     Viewport viewport;
     TransferEditor transfer;
+    NoteEditor note;
     FileDialog files;
     bool start_page = true, show_help = false, show_problems = false, show_expert = false;
     std::function<void()> after_saving_asked;  // waits for the answer about unsaved changes
@@ -175,6 +187,7 @@ void unless_changed(Editor& editor, std::function<void()> f);
 void open_file_dialog(Editor& editor, FileDialog::Purpose purpose, const std::filesystem::path& at,
                       std::function<void(const std::filesystem::path&)> chosen);
 void open_add_menu(Editor& editor, glm::dvec2 at);
+void open_note(Editor& editor, NoteEditor::Kind kind, std::size_t index);
 void fit_canvas(Editor& editor);
 void submit_changes(Editor& editor);
 void write_files(Editor& editor);
@@ -183,6 +196,7 @@ void write_files(Editor& editor);
 void draw_toolbar(Editor& editor);
 void draw_canvas(Editor& editor);
 void draw_add_menu(Editor& editor);
+void draw_note_editor(Editor& editor);
 void draw_viewport(Editor& editor);
 void draw_parameters(Editor& editor);
 bool has_transfer_editor(const NodeType& type);

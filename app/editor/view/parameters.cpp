@@ -291,8 +291,7 @@ void draw_heading(Editor& editor, const std::string& id, const NodeType* type) {
     if (ImGui::IsItemDeactivatedAfterEdit() && editor.id_text != id) {
         const std::string to = editor.id_text;
         edit(editor, [&] {
-            editor.work.document.rename_node(id, to);
-            editor.work.selected = {to};
+            rename_node(editor.work, id, to);
         });
         editor.id_of.clear();
     }
@@ -306,6 +305,16 @@ void draw_state(Editor& editor, const std::string& id) {
     const Theme& t = theme();
     if (!status->message.empty()) wrapped_in(status->state == NodeState::failed ? t.bad : t.warn, status->message);
     for (const std::string& warning : status->warnings) wrapped_in(t.warn, warning);
+}
+
+// Buttons side by side, in as many rows as they need.
+void draw_action_row(Editor& editor, const std::vector<const char*>& ids) {
+    const float end = ImGui::GetCursorScreenPos().x + ImGui::GetContentRegionAvail().x;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+        const float width = ImGui::CalcTextSize(action(ids[i]).title).x + 2 * ImGui::GetStyle().FramePadding.x;
+        if (i > 0 && ImGui::GetItemRectMax().x + ImGui::GetStyle().ItemSpacing.x + width < end) ImGui::SameLine();
+        action_button(editor, ids[i]);
+    }
 }
 
 void draw_measurements(Editor& editor, const std::string& id) {
@@ -375,6 +384,8 @@ void draw_parameters(Editor& editor) {
     if (!node) {
         const std::size_t n = editor.work.selected.size();
         wrapped_in(theme().muted, n == 0 ? "Select a node to see its parameters." : fmt::format("{} nodes are selected.", n));
+        if (n == 0) draw_action_row(editor, {"comment"});
+        else draw_action_row(editor, {"bypass", "disable", "group", "ungroup", "align", "duplicate", "delete"});
         return;
     }
     const std::string id = node->id;
@@ -382,6 +393,9 @@ void draw_parameters(Editor& editor) {
     ImGui::PushID(id.c_str());
     draw_heading(editor, id, type);
     draw_state(editor, id);
+    draw_action_row(editor, {"bypass", "disable", "group", "ungroup", "duplicate", "delete"});
+    node = editor.work.graph().find(id);
+    if (!node) return ImGui::PopID();
     ImGui::Dummy({0, ui(2)});
     if (type) {
         if (has_transfer_editor(*type)) draw_transfer_editor(editor, id, *type);
