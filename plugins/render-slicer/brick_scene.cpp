@@ -61,9 +61,13 @@ std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<Bri
         texels.transfer = request.transfer;
         texels.slab = request.slab;
         std::optional<Places> places;
-        if (whole) places = Places::whole_levels(desc, request.apron, texels.bytes(), most_bytes);
+        Apron apron = request.apron;
+        // A level alone is sampled without a look at its bounds: one voxel more at its beginning.
+        if (whole) apron.below = std::max(apron.below, 1);
+        if (whole) places = Places::whole_levels(desc, apron, texels.bytes(), most_bytes);
         whole = places && places->first_level <= finest;
         if (!whole) {
+            apron = request.apron;
             const std::uint64_t each = Atlas::slot_bytes(desc, request.apron, texels.bytes());
             const auto most = std::int64_t(most_bytes / each);
             if (need > most)
@@ -76,13 +80,13 @@ std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<Bri
                      "fewer bricks", need, human_bytes(double(each)), places->slots);
         }
         const Hash key = Hasher().text("atlas").value(desc.volume.color ? -1 : request.component)
-                             .value(request.apron.below).value(request.apron.above)
+                             .value(apron.below).value(apron.above)
                              .value(request.gradient_side.value_or(-1))
                              .hash(request.transfer ? hash_of(*request.transfer) : Hash{}).value(request.slab)
                              .value(whole ? places->first_level : -1).finish();
         auto make = [&](std::uint64_t& bytes) {
             auto holder = std::make_shared<Holder>();
-            holder->atlas = std::make_shared<Atlas>(bricks, texels, request.apron, *places);
+            holder->atlas = std::make_shared<Atlas>(bricks, texels, apron, *places);
             bytes += holder->atlas->bytes();
             return holder;
         };
@@ -234,8 +238,8 @@ BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, c
     scene.cell_size = glm::vec3(grid.cell);
     scene.cells = grid.cells;
     scene.brick_size = glm::vec3(desc.brick);
-    scene.brick_hi = glm::vec3(desc.brick + request.apron.above - 1);
-    scene.slot_lo = glm::vec3(float(-request.apron.below));
+    scene.brick_hi = glm::vec3(desc.brick + atlas->apron().above - 1);
+    scene.slot_lo = glm::vec3(float(-atlas->apron().below));
 
     auto field = std::make_shared<gpu::FieldSource>();
     const gpu::TexelLayout& layout = atlas->texels().layout;
@@ -252,7 +256,7 @@ BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, c
         scene.step = step_of(desc, l);
         scene.steps = 1;
         scene.slot_at = glm::vec3(atlas->texel_of({l, glm::ivec3(0)}));
-        scene.slot_hi = glm::vec3(level.bricks * desc.brick + request.apron.above - 1);
+        scene.slot_hi = glm::vec3(level.bricks * desc.brick + atlas->apron().above - 1);
         scene.scale = 1.0f / glm::vec3(level.stride);
         field->voxels.glsl = module("source-level");
     } else {
@@ -265,11 +269,12 @@ BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, c
 }
 
 void BrickScene::set(const gpu::Program& program) const {
-    for (const char* prefix : {"brick", "gradient", "classified"})
-        program.set((std::string(prefix) + "_dense_inverse_dims").c_str(), 1.0f / glm::vec3(atlas->values()->dims));
+    const glm::vec3 unit = 1.0f / glm::vec3(atlas->values()->dims);
+    program.set("slot_unit", unit);
     program.set("slot_lo", slot_lo);
     if (one_level) {
         program.set("slot_at", slot_at);
+        program.set("slot_base", (slot_at + 0.5f) * unit);
         program.set("slot_hi", slot_hi);
         program.set("page_scale", scale);
         return;

@@ -183,7 +183,11 @@ gpu::TexturePtr page_table(const BricksDesc& desc, const PageGrid& grid, const A
         t[3] = glm::vec4(glm::vec3(atlas.texel_of(p.brick)), float(p.brick.level));
         t[4] = glm::vec4(1.0f / glm::vec3(stride), 0.0f);
         t[5] = glm::vec4(glm::vec3(voxels + atlas.apron().above - 1), 0.0f);
-        if (!p.parent) continue;
+        if (!p.parent) {  // looked up all the same, with no share
+            t[6] = t[3];
+            t[8] = t[4];
+            continue;
+        }
         const glm::ivec3 coarse = desc.levels[std::size_t(p.parent->level)].stride;
         t[6] = glm::vec4(glm::vec3(atlas.texel_of(*p.parent)), 0.0f);
         // Where in the parent, in its voxels, the brick begins.

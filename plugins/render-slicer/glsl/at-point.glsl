@@ -18,8 +18,7 @@ vec4 TEXELS_parent(vec3 p) { return TEXELS_own(p); }
 vec4 TEXELS_at(vec3 p) {
     vec4 own = TEXELS_own(p);
 #ifdef BLENDED
-    // A loop of one turn or none: a branch would cost both of its sides.
-    for (float turn = 0.0; turn < page_blends; turn += 1.0) own = mix(own, TEXELS_parent(p), share_of_parent(p));
+    own = mix(own, TEXELS_parent(p), share_of_parent(p));
 #endif
     return own;
 }

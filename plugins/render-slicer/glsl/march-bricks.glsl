@@ -11,11 +11,8 @@ void march_bricks(float k, float end) {
     bvec3 level_with = lessThan(abs(ray_step), vec3(1e-20));
     vec3 inverse = 1.0 / mix(ray_step, vec3(1.0), level_with);
     float m = max(on_ray(k), drawn_to), leave = on_ray(end);
-    while (m < leave && !finished()) {
-        // A ray that leapt within its page stays on it; opening one is dear.
-        vec3 p = ray_at(ahead_of(m));
-        bool stays = all(lessThanEqual(page_lo, p)) && all(lessThan(p, page_hi));
-        for (float turn = stays ? 1.0 : 0.0; turn < 1.0; turn += 1.0) there = open_page(p);
+    if (m < leave) do {
+        there = open_page(ray_at(ahead_of(m)));
         vec3 out_at = (mix(page_lo, page_hi, greaterThan(ray_step, vec3(0.0))) - ray_point) * inverse;
         out_at = mix(out_at, vec3(1e30), level_with);
         float next = max(min(min(out_at.x, out_at.y), out_at.z), ahead_of(m));
@@ -40,7 +37,7 @@ void march_bricks(float k, float end) {
         march(from, there ? next : from);
         m = next;
         drawn_to = next;
-    }
+    } while (m < leave && !finished());
     ray_first = first;
     ray_last = last;
     slab_length = length_of_slab;

@@ -9,7 +9,7 @@ bool finished() { return hit > -1e30; }
 void march(float k, float end) {
     float m = on_ray(k);
     Sample front = observe(ray_at(m));
-    while (k < end && !finished()) {
+    do {
         k += kPart * PLANE_STEP;
         float next = on_ray(k);
         Sample back = observe(ray_at(next));
@@ -21,7 +21,7 @@ void march(float k, float end) {
             front = back;
             m = next;
         }
-    }
+    } while (k < end && !finished());
     if (!finished()) return;
     float lo = m, hi = hit;
     for (int i = 0; i < 12; ++i) {

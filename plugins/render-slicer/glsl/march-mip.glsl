@@ -16,10 +16,10 @@ void look(float m) {
 }
 void march(float k, float end) {
     look(on_ray(k));
-    while (k < end) {
+    do {
         k += PLANE_STEP;
         look(on_ray(k));
-    }
+    } while (k < end);
 }
 vec4 picture() {
     if (largest <= -1.0) return vec4(0.0);

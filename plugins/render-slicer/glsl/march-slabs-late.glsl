@@ -6,9 +6,9 @@
 void march(float k, float end) {
     float from = 0.0, m = on_ray(k);
     Sample front, back = observe(ray_at(m));
-    while (k < end && !finished()) {
+    do {
         bool seen = false;
-        while (k < end && !seen) {
+        do {
             k += PLANE_STEP;
             from = m;
             front = back;
@@ -16,7 +16,7 @@ void march(float k, float end) {
             back = observe(ray_at(m));
             samples += 1.0;
             seen = ANY(slab(front, back).a > 0.0);
-        }
+        } while (k < end && !seen);
         vec4 e = slab(front, back);
         vec3 p = ray_at(0.5 * (from + m));
         vec3 g = world_gradient(p);
@@ -27,5 +27,5 @@ void march(float k, float end) {
         e.rgb = shade(e.rgb / max(e.a, 1e-37), g, p) * e.a;
 #endif
         add_slab(e, (m - from) * slab_length);
-    }
+    } while (k < end && !finished());
 }

@@ -1,8 +1,9 @@
-// The slabs between planes k and end; front and back samples are known at the planes.
+// The slabs between planes k and end, at least one; front and back samples are known at the planes. SIMD
+// machines run what a loop's condition stands before once more with nobody in it: so it stands behind.
 void march(float k, float end) {
     float m = on_ray(k);
     Sample front = observe(ray_at(m));
-    while (k < end && !finished()) {
+    do {
         k += PLANE_STEP;
         float next = on_ray(k);
         Sample back = observe(ray_at(next));
@@ -10,5 +11,5 @@ void march(float k, float end) {
         samples += 1.0;
         front = back;
         m = next;
-    }
+    } while (k < end && !finished());
 }

@@ -4,6 +4,7 @@ uniform sampler3D page_index;         // page of each cell, below 0: none
 uniform sampler2D page_table;         // 12 texels a page, 4096 pages a column
 uniform vec3 cell_size;               // index coordinates
 uniform ivec3 cell_last;
+uniform vec3 slot_unit;               // texture coordinate of a texel
 uniform vec3 slot_lo;                 // first voxel in the texture, from the page's first own one
 uniform vec3 brick_size;              // own voxels of a brick
 uniform vec3 brick_hi;                // last voxel in the texture of a brick alone
@@ -16,11 +17,13 @@ float page_layer = 0.0;               // log2 of that
 float page_level = 0.0;
 vec3 slot_at;                         // texel of the page's first own voxel
 vec3 slot_hi;                         // last voxel in the texture
-float page_blends = 0.0;              // 1: mixes in its parent
+float page_blends = 0.0;              // 1: mixes in its parent; 0: that is the brick itself
 vec3 parent_at, parent_from, parent_scale;
 vec4 blend_below, blend_above;        // share of the parent at the corners, z low and high
+vec3 place_of(vec3 p) { return (slot_at + clamp(p, slot_lo, slot_hi) + 0.5) * slot_unit; }
 
-// Turns to the page of a point; false where nothing is drawn.
+// Turns to the page of a point; false where nothing is drawn. Nothing here is left out by a condition: SIMD
+// machines run both sides of one, and the body of a loop at least once.
 bool open_page(vec3 p) {
     ivec3 cell = clamp(ivec3(floor(p / cell_size)), ivec3(0), cell_last);
     float page = texelFetch(page_index, cell, 0).r;
@@ -41,14 +44,12 @@ bool open_page(vec3 p) {
     page_lo = mix(mix(vec3(cell) * cell_size, vec3(-1e6), equal(cell, ivec3(0))), lo.xyz, bvec3(there));
     page_hi = mix(mix(vec3(cell + 1) * cell_size, vec3(1e9), equal(cell, cell_last)), hi.xyz, bvec3(there));
 #ifdef BLENDED
-    page_blends = there ? first.w : 0.0;
-    for (float turn = 0.0; turn < page_blends; turn += 1.0) {
-        parent_at = texelFetch(page_table, at + ivec2(6, 0), 0).xyz;
-        parent_from = texelFetch(page_table, at + ivec2(7, 0), 0).xyz;
-        parent_scale = texelFetch(page_table, at + ivec2(8, 0), 0).xyz;
-        blend_below = texelFetch(page_table, at + ivec2(9, 0), 0);
-        blend_above = texelFetch(page_table, at + ivec2(10, 0), 0);
-    }
+    page_blends = first.w;
+    parent_at = texelFetch(page_table, at + ivec2(6, 0), 0).xyz;
+    parent_from = texelFetch(page_table, at + ivec2(7, 0), 0).xyz;
+    parent_scale = texelFetch(page_table, at + ivec2(8, 0), 0).xyz;
+    blend_below = texelFetch(page_table, at + ivec2(9, 0), 0);
+    blend_above = texelFetch(page_table, at + ivec2(10, 0), 0);
 #endif
     return there;
 }

@@ -50,10 +50,10 @@ void main() {
     vec3 inverse = 1.0 / mix(direction, vec3(1.0), across);
     vec3 far_side = vec3(greaterThan(direction, vec3(0.0)));
     vec3 inverse_size = 1.0 / block_size;
-    while (k < end && !finished()) {
+    if (k < end) do {
         // Leap while nothing near is seen, each time to the last plane of what is known of.
         float stop = k;
-        while (k < end && stop <= k) {
+        do {
             ivec3 block = clamp(ivec3((point + k * direction) * inverse_size), ivec3(0), block_last);
             int n = texelFetch(occupancy, block, 0).r;
 #ifdef CEILING
@@ -69,10 +69,10 @@ void main() {
             float next = n < 0 ? floor(out_at) : k;
             stop = next > k ? next : max(n > 0 ? ceil(out_at) : k, k + 1.0);
             k = next > k ? next : k;
-        }
+        } while (k < end && stop <= k);
         if (k < end) MARCH(k, stop);
         k = stop;
-    }
+    } while (k < end && !finished());
 #else
     if (k < end) MARCH(k, end);
 #endif
