@@ -2,17 +2,22 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <random>
+#include <thread>
 
 #include "app/editor/model/autosave.h"
+#include "app/editor/model/background.h"
 #include "app/editor/model/camera_control.h"
 #include "app/editor/model/commands.h"
 #include "app/editor/model/histogram.h"
 #include "app/editor/model/param_values.h"
 #include "app/editor/model/search.h"
 #include "app/editor/model/settings.h"
+#include "app/editor/model/thumbnail.h"
 #include "core/base/error.h"
 #include "tests/support/fake_nodes.h"
 #include "tests/support/volumes.h"
@@ -419,6 +424,75 @@ TEST(Histogram, readsAPartOfLargeVolumesAndSaysSo) {
     for (double count : h.counts) all += count;
     EXPECT_GT(all, 256);
     EXPECT_LT(all, 1024);
+}
+
+// --- small pictures, and what makes them -------------------------------------------------------------
+
+TEST(Thumbnail, isTheMeanOfThePixelsThatFallTogether) {
+    Image image({320, 480}, Image::Format::rgba32f);
+    for (int y = 0; y < 480; ++y)
+        for (int x = 0; x < 320; ++x) image.rgba32f()[std::size_t(y * 320 + x)] = glm::vec4((x + y) % 2, y < 240, NAN, 0.5);
+    const auto small = thumbnail_of(image);
+    EXPECT_EQ(small->size, glm::ivec2(107, 160));
+    EXPECT_NEAR(small->aspect, 2.0 / 3, 1e-12);
+    EXPECT_NEAR(small->pixels.front().r, 128, 15);
+    EXPECT_EQ(small->pixels.front().g, 255);
+    EXPECT_EQ(small->pixels.back().g, 0);
+    EXPECT_EQ(small->pixels.front().b, 0) << "not a number is black";
+    EXPECT_EQ(small->pixels.front().a, 255);
+    EXPECT_EQ(thumbnail_of(Image({1, 1}, Image::Format::rgba8))->size, glm::ivec2(1, 1));
+}
+
+TEST(Thumbnail, showsTheMiddleSliceOfAVolume) {
+    using voxloom::testing::make_volume;
+    const auto volume = make_volume({7, 5, 3}, ScalarType::i16, [](auto x, auto y, auto z) { return double(z == 1 ? x + 10 * y : -1000); });
+    const auto small = thumbnail_of(*volume);
+    ASSERT_EQ(small->size, glm::ivec2(7, 5));
+    EXPECT_EQ(small->pixels[4 * 7].r, 0) << "the first row is at the bottom";
+    EXPECT_EQ(small->pixels[6].r, 255);
+    // Thin ones are seen from their flat side; large ones a part of their voxels.
+    EXPECT_EQ(thumbnail_of(*make_volume({1, 6, 9}, ScalarType::u8, [](auto...) { return 3; }))->size, glm::ivec2(6, 9));
+    EXPECT_EQ(thumbnail_of(*make_volume({1, 1, 1}, ScalarType::f32, [](auto...) { return NAN; }))->size, glm::ivec2(1, 1));
+    EXPECT_EQ(thumbnail_of(*make_volume({0, 4, 4}, ScalarType::u8, [](auto...) { return 0; }))->size, glm::ivec2(0, 0));
+    const auto large = thumbnail_of(*make_volume({701, 331, 2}, ScalarType::f64, [](auto x, auto...) { return x == 0 ? -1e308 : 1e308; }));
+    EXPECT_LE(large->size.x, 2 * kThumbnailPixels);
+    EXPECT_EQ(large->pixels[0].r, 0);
+    EXPECT_EQ(large->pixels[1].r, 255);
+}
+
+TEST(Background, makesWhatIsAskedForOnceAndKeepsIt) {
+    std::atomic<int> changes{0}, calls{0};
+    Background<int> background([&] { ++changes; }, 2);
+    const auto a = std::make_shared<int>(1), b = std::make_shared<int>(2);
+    auto made = [&](std::shared_ptr<int> of, double number) {
+        for (int i = 0; i < 5000; ++i) {
+            auto found = background.find({of, {}, number}, [of, number, &calls](const std::stop_token&) {
+                ++calls;
+                return std::make_shared<const int>(*of * 10 + int(number));
+            });
+            if (found) return *found;
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+        return -1;
+    };
+    EXPECT_EQ(made(a, 0), 10);
+    EXPECT_EQ(made(b, 0), 20);
+    EXPECT_EQ(made(a, 0), 10);
+    EXPECT_EQ(calls, 2);
+    EXPECT_EQ(made(a, 5), 15) << "another number is another thing; the oldest goes";
+    EXPECT_EQ(made(b, 0), 20);
+    EXPECT_EQ(calls, 4);
+    // What cannot be made is not tried again and again.
+    std::atomic<int> tries{0};
+    auto failing = [&](const std::stop_token&) -> std::shared_ptr<const int> {
+        ++tries;
+        throw Error("no");
+    };
+    EXPECT_EQ(background.find({b, a, 1}, failing), nullptr);
+    for (int i = 0; i < 5000 && tries == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_EQ(background.find({b, a, 1}, failing), nullptr);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_EQ(tries, 1);
 }
 
 // --- the camera ----------------------------------------------------------------------------------

@@ -299,7 +299,7 @@ TEST_F(Window, picturesOfTwoBranchesAreComparedWithLinkedCameras) {
     type: slicer.render
     in:  { source: head.volume, transfer: tf.transfer, camera: other-camera.camera }
     set: { size: [120, 120], slice_distance: 4 }
-    at: [480, 200]
+    at: [480, 280]
   - id: error
     type: metrics.image
     in:  { image: coarse.image, reference: view.image }

@@ -10,8 +10,6 @@ namespace voxloom::editor {
 
 namespace {
 
-constexpr std::size_t kMostKept = 16;
-
 // Rows of voxels, spread evenly: every `step`-th of the volume's y-z plane.
 template <class F>
 void for_rows(const Volume& volume, std::int64_t step, const std::stop_token& stop, F&& f) {
@@ -60,47 +58,6 @@ Histogram histogram_of(const Volume& volume, const std::stop_token& stop, std::u
         h.counts[std::size_t(std::clamp(bin, 0.0, double(kHistogramBins - 1)))] += 1;
     });
     return h;
-}
-
-HistogramMaker::HistogramMaker(std::function<void()> changed)
-    : changed_(std::move(changed)), thread_([this](const std::stop_token& stop) { loop(stop); }) {}
-
-HistogramMaker::~HistogramMaker() {
-    thread_.request_stop();
-    wake_.notify_all();
-}
-
-std::shared_ptr<const Histogram> HistogramMaker::find(const VolumePtr& volume) {
-    std::lock_guard lock(mutex_);
-    for (const Entry& entry : made_)
-        if (entry.volume.lock() == volume) return entry.histogram;
-    wanted_ = volume;
-    wake_.notify_all();
-    return nullptr;
-}
-
-void HistogramMaker::loop(const std::stop_token& stop) {
-    for (;;) {
-        VolumePtr volume;
-        {
-            std::unique_lock lock(mutex_);
-            if (!wake_.wait(lock, stop, [&] { return wanted_ != nullptr; })) return;
-            volume = std::move(wanted_);
-            wanted_.reset();
-        }
-        auto histogram = std::make_shared<Histogram>();
-        try {
-            *histogram = histogram_of(*volume, stop);
-        } catch (const Cancelled&) {
-            return;
-        } catch (const std::exception&) {
-            histogram->counts.assign(kHistogramBins, 0.0);  // the node that reads it says what is wrong
-        }
-        std::lock_guard lock(mutex_);
-        made_.push_front({volume, std::move(histogram)});
-        if (made_.size() > kMostKept) made_.pop_back();
-        if (changed_) changed_();
-    }
 }
 
 }  // namespace voxloom::editor

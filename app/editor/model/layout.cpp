@@ -9,7 +9,7 @@ namespace voxloom::editor {
 
 namespace {
 
-constexpr double kColumnGap = 70, kRowGap = 30;
+constexpr double kColumnGap = 90, kRowGap = 30;
 
 // Nodes that feed each node, as indices.
 std::vector<std::vector<std::size_t>> sources_of(const Graph& graph) {
@@ -50,9 +50,21 @@ bool NodeBox::overlaps(glm::dvec2 lo, glm::dvec2 hi) const {
     return lo.x <= at.x + size.x && hi.x >= at.x && lo.y <= at.y + size.y && hi.y >= at.y;
 }
 
+double picture_height(const NodePorts& ports) {
+    double height = 0;
+    for (const PortSpec& port : ports.outputs) {
+        if (!ports.type) continue;
+        const PortType type = type_of(port);
+        if (type == PortType::image || type == PortType::volume) height = std::max(height, 96.0);
+        if (type == PortType::table) height = std::max(height, 68.0);
+        if (type == PortType::transfer) height = std::max(height, 44.0);
+    }
+    return height;
+}
+
 glm::dvec2 node_size(const NodePorts& ports) {
     const std::size_t rows = std::max(ports.inputs.size(), ports.outputs.size());
-    return {kNodeWidth, kHeaderHeight + double(rows) * kRowHeight + kFooterHeight};
+    return {kNodeWidth, kHeaderHeight + double(rows) * kRowHeight + picture_height(ports) + kFooterHeight};
 }
 
 glm::dvec2 snapped(glm::dvec2 at) { return glm::round(at / kSnap) * kSnap; }

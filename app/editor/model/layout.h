@@ -9,6 +9,8 @@
 
 namespace voxloom::editor {
 
+// A node is its header, a row for each port, a picture where its type gives what can be looked at, and a
+// footer.
 inline constexpr double kNodeWidth = 190, kHeaderHeight = 26, kRowHeight = 20, kFooterHeight = 22;
 inline constexpr double kSnap = 10;
 
@@ -20,6 +22,7 @@ struct NodeBox {
     bool overlaps(glm::dvec2 lo, glm::dvec2 hi) const;
 };
 
+double picture_height(const NodePorts& ports);  // 0: it gives nothing to look at
 glm::dvec2 node_size(const NodePorts& ports);
 
 // By index of graph.nodes.

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "app/editor/view/canvas_mouse.h"
-#include "app/editor/view/picture.h"
 #include "core/base/error.h"
 
 namespace voxloom::editor {
@@ -99,8 +98,6 @@ void show_tooltip(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     ImGui::PushTextWrapPos(ui(340));
     ImGui::TextUnformatted(text.c_str());
     ImGui::PopTextWrapPos();
-    if (!hit.port && hit.node >= 0)
-        draw_thumbnail(editor, editor.work.graph().nodes[std::size_t(hit.node)].id, editor.canvas.ports[std::size_t(hit.node)], ui(180));
     ImGui::EndTooltip();
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "core/base/text.h"
 
@@ -28,6 +29,10 @@ void draw_grid(const Pen& pen, glm::dvec2 lo, glm::dvec2 size) {
 }
 
 void draw_wire(const Pen& pen, const Wire& w, float thickness, float alpha) {
+    // A curve lies within the hull of its four points.
+    const glm::dvec2 lo = glm::min(glm::min(w.p[0], w.p[1]), glm::min(w.p[2], w.p[3]));
+    const glm::dvec2 hi = glm::max(glm::max(w.p[0], w.p[1]), glm::max(w.p[2], w.p[3]));
+    if (!pen.sees({pen.canvas.to_canvas(lo), (hi - lo) / pen.zoom})) return;
     pen.list.AddBezierCubic(im(w.p[0]), im(w.p[1]), im(w.p[2]), im(w.p[3]),
                             faded(w.known ? color_of(w.type) : theme().muted, alpha), thickness);
 }
@@ -72,7 +77,7 @@ void draw_port(const Pen& pen, glm::dvec2 at, const PortSpec& port, const NodePo
     const ImU32 text = wired || output || !port.optional ? theme().text : theme().muted;
     if (!output) return pen.text(at + glm::dvec2(10, -8), text, port.key, kNodeWidth * 0.52);
     const double room = kNodeWidth * 0.52;
-    const double width = std::min(double(pen.width_of(port.key)) / pen.zoom, room);
+    const double width = std::min(pen.width_of(port.key), room);
     pen.text(at - glm::dvec2(10 + width, 8), text, port.key, room + 1);
 }
 
@@ -119,6 +124,8 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
     for (std::size_t k = 0; k < ports.outputs.size(); ++k) draw_port(pen, box.output(int(k)), ports.outputs[k], ports, true, true);
 
     const double foot = box.at.y + box.size.y - kFooterHeight;
+    if (const double height = picture_height(ports); height > 0)
+        draw_look(pen, editor, node.id, ports, {{box.at.x + 8, foot - height + 2}, {kNodeWidth - 16, height - 4}});
     if (status) {
         if (status->state == NodeState::running && status->fraction >= 0) {
             const float end = lo.x + (hi.x - lo.x) * float(std::clamp(status->fraction, 0.0, 1.0));
@@ -168,13 +175,15 @@ bool Pen::sees(const NodeBox& box) const {
     return b.x >= canvas.lo.x && b.y >= canvas.lo.y && a.x <= end.x && a.y <= end.y;
 }
 
-void Pen::text(glm::dvec2 p, ImU32 c, const std::string& s, double width) const {
-    if (!readable()) return;
-    const std::string cut = shortened(s, px(width), theme().body, font_size());
-    list.AddText(theme().body, font_size(), at(p), color(c), cut.c_str());
+void Pen::text(glm::dvec2 p, ImU32 c, const std::string& s, double width, double height) const {
+    if (!readable() || s.empty()) return;
+    const std::string cut = shortened(s, px(width), theme().body, px(height));
+    list.AddText(theme().body, px(height), at(p), color(c), cut.c_str());
 }
 
-float Pen::width_of(const std::string& s) const { return theme().body->CalcTextSizeA(font_size(), FLT_MAX, 0, s.c_str()).x; }
+double Pen::width_of(const std::string& s, double height) const {
+    return double(theme().body->CalcTextSizeA(px(height), FLT_MAX, 0, s.c_str()).x) / zoom;
+}
 
 std::pair<glm::dvec2, glm::dvec2> bounds_of(const Canvas& canvas) {
     glm::dvec2 lo(1e300), hi(-1e300);
@@ -234,18 +243,6 @@ double distance_to(const Wire& w, glm::dvec2 point) {
     return nearest;
 }
 
-std::string flow_text(const Editor& editor, const WireEnd& output) {
-    const NodeStatus* status = status_of(editor, output.node);
-    const GraphNode* node = editor.work.graph().find(output.node);
-    const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
-    const PortSpec* port = type ? type->find_output(output.port) : nullptr;
-    if (!status || !port) return {};
-    const auto o = std::size_t(port - type->outputs.data());
-    std::string text = o < status->outputs.size() ? summary(status->outputs[o]) : std::string(name_of(type_of(*port)));
-    if (status->bytes > 0) text += ", " + human_bytes(double(status->bytes));
-    return text;
-}
-
 void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire) {
     const Canvas& canvas = editor.canvas;
     const Theme& t = theme();
@@ -259,6 +256,11 @@ void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire
         const bool strong = int(i) == hovered_wire || editor.work.selected.count(wires[i].from.node) || editor.work.selected.count(wires[i].to.node);
         draw_wire(pen, wires[i], std::max(pen.px(strong ? 3 : 2), 1.f), strong ? 1.f : 0.65f);
     }
+    std::set<std::pair<std::string_view, std::string_view>> said;  // the wires of one output say it once
+    for (const Wire& wire : wires)
+        if (const std::pair<std::string_view, std::string_view> output{wire.from.node, wire.from.port};
+            !said.count(output) && draw_flow(pen, editor, wire))
+            said.insert(output);
     for (std::size_t i = 0; i < canvas.boxes.size(); ++i) {
         const bool moving = canvas.drag == Canvas::Drag::nodes && editor.work.selected.count(editor.work.graph().nodes[i].id);
         draw_node(pen, editor, i, moving ? canvas.moved : glm::dvec2(0.0));

@@ -30,7 +30,7 @@ void draw_comment(const Pen& pen, const Comment& comment, const NodeBox& box, bo
     pen.list.AddRectFilled(lo, {lo.x + std::max(pen.px(3), 1.f), hi.y}, faded(theme().warn, 0.8f));
     if (selected) pen.list.AddRect(lo, hi, theme().accent, pen.px(4), 0, std::max(pen.px(2), 1.5f));
     if (!pen.readable()) return;
-    pen.list.AddText(theme().body, pen.font_size(), pen.at(box.at + glm::dvec2(kCommentPadding, kCommentPadding / 2)), theme().text,
+    pen.list.AddText(theme().body, pen.px(13), pen.at(box.at + glm::dvec2(kCommentPadding, kCommentPadding / 2)), theme().text,
                      comment.text.c_str(), nullptr, pen.px(kCommentWidth - 2 * kCommentPadding));
 }
 

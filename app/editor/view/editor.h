@@ -13,10 +13,12 @@
 #include <vector>
 
 #include "app/editor/model/autosave.h"
+#include "app/editor/model/background.h"
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
 #include "app/editor/model/histogram.h"
 #include "app/editor/model/settings.h"
+#include "app/editor/model/thumbnail.h"
 #include "app/editor/view/theme.h"
 
 namespace voxloom::editor {
@@ -64,8 +66,14 @@ struct Picture {
 
 struct Difference {
     Picture picture;
-    double scale = 8, made_with = 0;
-    std::pair<std::uint64_t, std::uint64_t> serials;  // of the two pictures
+    double scale = 8;
+    ImagePtr shown;            // in the texture
+};
+
+// What a node's thumbnail shows.
+struct SmallPicture {
+    Picture picture;
+    std::shared_ptr<const Thumbnail> thumbnail;  // in the texture
 };
 
 // Pictures, alone or compared; all are moved and magnified together.
@@ -150,13 +158,15 @@ struct Editor {
     double moving_until = 0;    // a wheel that turns has no button to let go
     std::filesystem::path output_folder = "out";
 
-    std::map<std::string, Picture> thumbnails;  // by port
+    std::map<std::string, SmallPicture> thumbnails;  // by port
     std::vector<double> frame_seconds;          // of the newest frames, a ring
     std::size_t frames_drawn = 0;
 
     std::vector<Mark> marks;
     Evaluator::State live;
-    HistogramMaker histograms;
+    Background<Histogram> histograms;
+    Background<Thumbnail> small_pictures;
+    Background<Image> differences;
     Evaluator evaluator;        // the last: it ends first
 };
 

@@ -24,16 +24,12 @@ std::vector<glm::u8vec4> pixels_of(const Image& image) {
         for (glm::u8vec4& p : pixels) p.a = 255;
         return pixels;
     }
-    auto byte = [](float v) { return std::uint8_t(v > 0 ? std::min(v, 1.f) * 255 + 0.5f : 0.f); };
-    std::ranges::transform(image.rgba32f(), pixels.begin(), [&](const glm::vec4& p) {
-        return glm::u8vec4(byte(p.r), byte(p.g), byte(p.b), 255);
-    });
+    std::ranges::transform(image.rgba32f(), pixels.begin(), screen_pixel);
     return pixels;
 }
 
-void upload(Picture& picture, const Image& image) {
+void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
     if (!picture.texture) glGenTextures(1, &picture.texture);
-    const std::vector<glm::u8vec4> pixels = pixels_of(image);
     GLint before = 0;
     glGetIntegerv(GL_TEXTURE_BINDING_2D, &before);
     glBindTexture(GL_TEXTURE_2D, picture.texture);
@@ -41,10 +37,12 @@ void upload(Picture& picture, const Image& image) {
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, image.size().x, image.size().y, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA, size.x, size.y, 0, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
     glBindTexture(GL_TEXTURE_2D, GLuint(before));
-    picture.size = image.size();
+    picture.size = size;
 }
+
+void upload(Picture& picture, const Image& image) { upload(picture, image.size(), pixels_of(image)); }
 
 const Image* image_in(const LiveValue* value) {
     const ImagePtr* image = value ? std::get_if<ImagePtr>(&value->value) : nullptr;
@@ -61,19 +59,25 @@ bool update_picture(Picture& picture, const LiveValue* value) {
     return true;
 }
 
-bool update_difference(Viewport& view, const LiveValue* a, const LiveValue* b, std::string& why) {
+bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, std::string& why) {
     const Image* first = image_in(a);
     const Image* second = image_in(b);
     why = "There are no two pictures yet.";
     if (!first || !second) return false;
     why = problem_with_comparison(first->size(), second->size());
     if (!why.empty()) return false;
-    Difference& d = view.difference;
-    if (d.serials != std::pair(a->serial, b->serial) || d.made_with != d.scale)
-        upload(d.picture, *difference_image(*first, *second, d.scale));
-    d.serials = {a->serial, b->serial};
-    d.made_with = d.scale;
-    return true;
+    Difference& d = editor.viewport.difference;
+    const ImagePtr x = std::get<ImagePtr>(a->value), y = std::get<ImagePtr>(b->value);
+    const double scale = d.scale;
+    const ImagePtr made = editor.differences.find({x, y, scale}, [x, y, scale](const std::stop_token&) -> ImagePtr {
+        return difference_image(*x, *y, scale);
+    });
+    if (made && made != d.shown) {
+        upload(d.picture, *made);
+        d.shown = made;
+    }
+    why = "Computing…";
+    return d.shown != nullptr;
 }
 
 void delete_textures(Editor& editor) {
@@ -82,21 +86,34 @@ void delete_textures(Editor& editor) {
         picture = {};
     };
     std::ranges::for_each(editor.viewport.pictures, release);
-    for (auto& [port, picture] : editor.thumbnails) release(picture);
+    for (auto& [port, small] : editor.thumbnails) release(small.picture);
     release(editor.viewport.difference.picture);
 }
 
-void draw_thumbnail(Editor& editor, const std::string& node, const NodePorts& ports, float most) {
+SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports) {
     for (const PortSpec& port : ports.outputs) {
         const std::string name = node + "." + port.key;
-        auto value = editor.live.values.find(name);
-        if (value == editor.live.values.end()) continue;
-        Picture& picture = editor.thumbnails[name];
-        if (!update_picture(picture, &value->second)) continue;
-        const float scale = most / float(std::max(picture.size.x, picture.size.y));
-        ImGui::Image(reinterpret_cast<ImTextureID>(std::uintptr_t(picture.texture)), {float(picture.size.x) * scale, float(picture.size.y) * scale});
-        return;
+        std::shared_ptr<const Thumbnail> made;
+        if (auto value = editor.live.values.find(name); value != editor.live.values.end()) {
+            const ImagePtr* image = std::get_if<ImagePtr>(&value->second.value);
+            if (!image) continue;
+            // While something moves the last whole picture stays.
+            if (value->second.fresh)
+                made = editor.small_pictures.find({*image}, [image = *image](const std::stop_token&) { return thumbnail_of(*image); });
+        } else if (auto found = editor.live.volumes.find(name); found != editor.live.volumes.end()) {
+            if (const VolumePtr volume = found->second.lock())
+                made = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); });
+        } else {
+            continue;
+        }
+        SmallPicture& small = editor.thumbnails[name];
+        if (made && made != small.thumbnail && made->size.x > 0) {
+            upload(small.picture, made->size, made->pixels);
+            small.thumbnail = made;
+        }
+        return small.thumbnail ? &small : nullptr;
     }
+    return nullptr;
 }
 
 std::string pixel_text(const Image& image, glm::dvec2 at, const Camera* camera) {

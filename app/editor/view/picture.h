@@ -9,12 +9,13 @@ namespace voxloom::editor {
 
 // Uploads where the value is another one. False where there is no picture.
 bool update_picture(Picture& picture, const LiveValue* value);
-// |a - b| * scale, made anew when one of them is another one. False where they cannot be compared; the
-// reason is then in `why`.
-bool update_difference(Viewport& view, const LiveValue* a, const LiveValue* b, std::string& why);
+// |a - b| * scale, made on another thread when one of them is another one; until then the last one stays.
+// False where there is none; the reason is then in `why`.
+bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, std::string& why);
 void delete_textures(Editor& editor);
-// The first image of a node as an item of ImGui, no larger than `most` pixels; nothing where there is none.
-void draw_thumbnail(Editor& editor, const std::string& node, const NodePorts& ports, float most);
+// The small picture of what a node gives, where there is one: of its first image or volume.
+SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports);
+inline ImTextureID texture_of(const Picture& picture) { return reinterpret_cast<ImTextureID>(std::uintptr_t(picture.texture)); }
 
 // "(3, 4)  0.1 0.2 0.3 1": what a pixel is, and where in the world what it shows. Empty outside.
 std::string pixel_text(const Image& image, glm::dvec2 at, const Camera* camera);

@@ -66,7 +66,10 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     std::erase_if(s.points, [](const auto& row) { return row.size() != 2 && row.size() != 5; });
     for (const auto& [port, value] : editor.live.values)
         if (auto* f = std::get_if<TransferPtr>(&value.value); f && port.starts_with(node.id + ".")) s.function = *f;
-    if (VolumePtr volume = data_of(editor, node)) s.histogram = editor.histograms.find(volume);
+    if (VolumePtr volume = data_of(editor, node))
+        s.histogram = editor.histograms.find({volume}, [volume](const std::stop_token& stop) {
+            return std::make_shared<const Histogram>(histogram_of(*volume, stop));
+        });
     if (s.histogram) s.range = s.histogram->range;
     else if (s.function && s.function->one.points.size() > 1)
         s.range = {s.function->one.points.front().value, s.function->one.points.back().value};

@@ -215,7 +215,7 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     bool there = update_picture(*picture, value);
     const bool other_there = b != a && update_picture(view.pictures[b], other);
     if (view.mode == Mode::difference) {
-        there = update_difference(view, value, other, why);
+        there = update_difference(editor, value, other, why);
         picture = &view.difference.picture;
     } else if (view.mode == Mode::flicker && other_there && std::fmod(ImGui::GetTime(), 1.0) > 0.5) {
         picture = &view.pictures[b];
@@ -229,14 +229,13 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     handle_mouse(editor, middle, view.zoom > 0 ? view.zoom : fitted, whole.y);
     const double scale = view.zoom > 0 ? view.zoom : fitted;
     const glm::dvec2 half = whole * scale * 0.5, lo = middle + view.offset - half, hi = middle + view.offset + half;
-    auto texture = [](const Picture& p) { return reinterpret_cast<ImTextureID>(std::uintptr_t(p.texture)); };
     ImDrawList& list = *ImGui::GetWindowDrawList();
     list.PushClipRect(im(cell.lo), im(cell.lo + cell.size), true);
-    list.AddImage(texture(*picture), im(lo), im(hi));
+    list.AddImage(texture_of(*picture), im(lo), im(hi));
     if (view.mode == Mode::wipe && other_there) {
         if (hovered && !ImGui::IsItemActive()) view.wipe = std::clamp((double(ImGui::GetMousePos().x) - lo.x) / (hi.x - lo.x), 0.0, 1.0);
         const double x = lo.x + view.wipe * (hi.x - lo.x);
-        list.AddImage(texture(view.pictures[b]), im({x, lo.y}), im(hi), {float(view.wipe), 0}, {1, 1});
+        list.AddImage(texture_of(view.pictures[b]), im({x, lo.y}), im(hi), {float(view.wipe), 0}, {1, 1});
         list.AddLine(im({x, lo.y}), im({x, hi.y}), theme().accent, std::max(ui(1), 1.f));
     }
     std::string text = view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
