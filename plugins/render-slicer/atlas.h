@@ -63,6 +63,7 @@ class Atlas {
     Counters load(const BricksPtr& bricks, const std::vector<BrickId>& wanted, const std::stop_token& stop,
                   const std::function<void(double)>& progress);
 
+    bool has(BrickId id) const { return index_.contains(id); }
     std::int64_t slots() const { return places_.slots; }
     const Places& places() const { return places_; }
     const gpu::TexturePtr& values() const { return values_; }

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 #include "core/base/text.h"
 #include "core/graph/node.h"
 #include "plugins/render-slicer/blocks.h"
+#include "plugins/render-slicer/decoding.h"
 #include "plugins/render-slicer/keep.h"
 #include "plugins/render-slicer/modules.h"
 #include "plugins/render-slicer/pages.h"
@@ -37,9 +39,9 @@ ValueRange range_of_everything(const Bricks& bricks, const std::stop_token& stop
     return lo <= hi ? ValueRange{std::clamp(lo, least, most), std::clamp(hi, least, most)} : ValueRange{};
 }
 
-// The atlas with all of `wanted` in it; made anew where it is too small or its texels lack validity.
-std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<BrickId>& wanted, ValueRange range,
-                                  const BrickRequest& request, Evaluation& ev) {
+// The atlas that has room for `wanted`; made anew where it is too small or its texels lack validity.
+std::shared_ptr<Atlas> atlas_for(const BricksPtr& bricks, const std::vector<BrickId>& wanted, ValueRange range,
+                                 const BrickRequest& request, bool validity) {
     struct Holder {
         std::shared_ptr<Atlas> atlas;
     };
@@ -51,7 +53,8 @@ std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<Bri
     for (const BrickId& id : wanted) finest = std::min(finest, id.level);
     // The rest is for tables and the like.
     const std::uint64_t most_bytes = request.gpu_bytes / 4 * 3;
-    bool validity = desc.volume.has_mask, whole = true;
+    validity = validity || desc.volume.has_mask;
+    bool whole = true;
     for (;;) {
         Texels texels;
         texels.layout = gpu::texel_layout(desc.volume, request.component, range, validity);
@@ -107,8 +110,36 @@ std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<Bri
             whole = false;  // the driver has no room for all of it
             continue;
         }
+        return holder->atlas;
+    }
+}
+
+// The same pages, of bricks that are on the GPU or at least decoded. The coarsest ones are drawn in any case.
+std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
+    std::unordered_map<BrickId, bool, HashOfBrickId> known;
+    auto is_there = [&](BrickId id) {
+        const auto [it, is_new] = known.try_emplace(id, false);
+        if (is_new) it->second = plan.atlas->has(id) || is_decoded(*plan.bricks, id, Atlas::kReach);
+        return it->second;
+    };
+    std::vector<Page> pages = plan.pages;
+    for (Page& p : pages) {
+        if (is_there(p.brick) && (!p.parent || is_there(*p.parent))) continue;
+        p.parent.reset();
+        p.blend = {};
+        while (!is_there(p.brick))
+            if (const auto coarser = plan.bricks->desc().coarser(p.brick))
+                p.brick = *coarser;
+            else
+                break;
+    }
+    return pages;
+}
+
+void load_atlas(BrickPlan& plan, const std::vector<BrickId>& wanted, const BrickRequest& request, Evaluation& ev) {
+    for (;;) {
         const std::uint64_t families = BrickCache::global().counters().families_decoded;
-        const Atlas::Counters c = holder->atlas->load(bricks, wanted, ev.stop(), [&](double f) {
+        const Atlas::Counters c = plan.atlas->load(plan.bricks, wanted, ev.stop(), [&](double f) {
             ev.progress(0.1 + 0.6 * f, "decoding and uploading bricks");
         });
         ev.count("bricks resident", double(c.hits));
@@ -116,9 +147,9 @@ std::shared_ptr<Atlas> load_atlas(const BricksPtr& bricks, const std::vector<Bri
         ev.count("bricks evicted", double(c.evicted));
         ev.count("bytes uploaded", double(c.bytes));
         ev.count("families decoded", double(BrickCache::global().counters().families_decoded - families));
-        if (!c.found_invalid || validity || desc.volume.color) return holder->atlas;
-        validity = true;  // seen for the first time: all texels get a channel for it
-        Keep::instance().drop(bricks, key);
+        if (!c.found_invalid || plan.atlas->texels().layout.validity || plan.bricks->desc().volume.color) return;
+        // Seen for the first time: all texels get a channel for it.
+        plan.atlas = atlas_for(plan.bricks, plan.wanted, plan.range, request, true);
     }
 }
 
@@ -202,35 +233,53 @@ void find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, cons
 
 }  // namespace
 
-BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request,
-                          Evaluation& ev) {
-    const BricksDesc& desc = bricks->desc();
-    if (selection) check_selection(*selection, desc);
-    BrickScene scene;
-    scene.range = *Keep::instance().get<ValueRange>(bricks, Hasher().text("range").finish(), [&](std::uint64_t&) {
+std::vector<BrickId> BrickPlan::missing() const {
+    std::vector<BrickId> out;
+    for (const BrickId& id : wanted)
+        if (!atlas->has(id)) out.push_back(id);
+    return out;
+}
+
+BrickPlan plan_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request, Evaluation& ev) {
+    if (selection) check_selection(*selection, bricks->desc());
+    BrickPlan plan;
+    plan.bricks = bricks;
+    plan.range = *Keep::instance().get<ValueRange>(bricks, Hasher().text("range").finish(), [&](std::uint64_t&) {
         return std::make_shared<ValueRange>(range_of_everything(*bricks, ev.stop()));
     });
-    const IsVisible visible = [&](ValueRange r) { return request.visible(scene.range.min, r.min, r.max); };
     std::size_t transparent = 0;
-    const std::vector<Page> pages = pages_of(*bricks, selection, visible, transparent);
+    plan.pages = pages_of(*bricks, selection, [&](ValueRange r) { return request.visible(plan.range.min, r.min, r.max); }, transparent);
     ev.count("bricks skipped (transparent)", double(transparent));
-    if (pages.empty()) return scene;
-    const std::vector<BrickId> wanted = bricks_of(pages);
-    ev.count("bricks drawn", double(wanted.size()));
-    const std::shared_ptr<Atlas> atlas = load_atlas(bricks, wanted, scene.range, request, ev);
+    if (plan.pages.empty()) return plan;
+    plan.wanted = bricks_of(plan.pages);
+    ev.count("bricks drawn", double(plan.wanted.size()));
+    plan.atlas = atlas_for(bricks, plan.wanted, plan.range, request, false);
+    return plan;
+}
+
+BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation& ev, bool what_is_there) {
+    const BricksPtr& bricks = plan.bricks;
+    const BricksDesc& desc = bricks->desc();
+    BrickScene scene;
+    scene.range = plan.range;
+    if (plan.pages.empty()) return scene;
+    const std::vector<Page> pages = what_is_there ? pages_of_what_is_there(plan) : plan.pages;
+    load_atlas(plan, bricks_of(pages), request, ev);
+    const std::shared_ptr<Atlas> atlas = plan.atlas;
     scene.atlas = atlas;
 
     find_occupancy(desc, pages, *atlas, request, scene);
-    ev.count("blocks", double(scene.blocks.x) * double(scene.blocks.y) * double(scene.blocks.z));
-    ev.count("blocks drawn", double(scene.seen));
+    if (!what_is_there) ev.count("blocks", double(scene.blocks.x) * double(scene.blocks.y) * double(scene.blocks.z));
+    if (!what_is_there) ev.count("blocks drawn", double(scene.seen));
     if (scene.seen == 0) return scene;
 
     PageGrid grid = grid_of(desc, pages);
     if (request.in_view && atlas->places().whole())
         grid = merged(desc, grid, [&](BrickId id) {
-            return !visible(bricks->info(id).range) || !request.in_view(desc.fine_box_of(id));
+            const ValueRange r = bricks->info(id).range;
+            return !request.visible(scene.range.min, r.min, r.max) || !request.in_view(desc.fine_box_of(id));
         });
-    ev.count("pages drawn", double(grid.pages.size()));
+    if (!what_is_there) ev.count("pages drawn", double(grid.pages.size()));
     for (const Page& p : grid.pages) {
         scene.blended = scene.blended || p.parent;
         scene.steps = std::max(scene.steps, 1 + int(std::log2(step_of(desc, p.brick.level))));

@@ -10,6 +10,7 @@
 #include "core/data/selection.h"
 #include "core/gpu/source.h"
 #include "plugins/render-slicer/atlas.h"
+#include "plugins/render-slicer/pages.h"
 
 namespace voxloom {
 class Evaluation;
@@ -50,8 +51,19 @@ struct BrickRequest {
     std::uint64_t gpu_bytes = 0;     // that the atlas may take
 };
 
+// What a picture draws of its bricks and where they go; nothing is decoded yet.
+struct BrickPlan {
+    BricksPtr bricks;
+    ValueRange range;                // of every value that any brick can hold
+    std::vector<Page> pages;         // empty: nothing can be seen
+    std::vector<BrickId> wanted;
+    std::shared_ptr<Atlas> atlas;
+    std::vector<BrickId> missing() const;  // on the GPU
+};
 // selection null: everything at level 0. [OpenGL thread]
-BrickScene prepare_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request,
-                          Evaluation& ev);
+BrickPlan plan_bricks(const BricksPtr& bricks, const Selection* selection, const BrickRequest& request, Evaluation& ev);
+// Everything wanted is decoded and uploaded, or, of `what_is_there`, what is decoded already: a brick that is
+// not gives way to its nearest ancestor that is. [OpenGL thread]
+BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation& ev, bool what_is_there = false);
 
 }  // namespace voxloom::slicer

@@ -19,13 +19,13 @@ std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, con
             return;
         }
         if (b.octants == 0xff || b.id.level == 0) {
-            pages.push_back({b.id, desc.fine_box_of(b.id), b.corner_blend, parent});
+            pages.push_back({b.id, desc.fine_box_of(b.id), b.id.level, b.corner_blend, parent});
             return;
         }
         for (int o = 0; o < 8; ++o)
             if (b.octants >> o & 1)
                 if (const Box cell = fine_box_of_octant(desc, b.id, o); !cell.empty())
-                    pages.push_back({b.id, cell, b.corner_blend, parent});
+                    pages.push_back({b.id, cell, b.id.level - 1, b.corner_blend, parent});
     };
     if (selection) {
         for (const SelectedBrick& b : selection->bricks) add(b);
@@ -55,9 +55,7 @@ PageGrid grid_of(const BricksDesc& desc, std::vector<Page> pages) {
     PageGrid grid;
     grid.cell = glm::i64vec3(std::numeric_limits<std::int64_t>::max());
     for (const Page& p : pages) {
-        // Octants of a partly replaced brick are as large as the bricks of the next finer level.
-        const bool whole = p.cell == desc.fine_box_of(p.brick) || p.brick.level == 0;
-        const LevelDesc& level = desc.levels[std::size_t(whole ? p.brick.level : p.brick.level - 1)];
+        const LevelDesc& level = desc.levels[std::size_t(p.cell_level)];
         grid.cell = glm::min(grid.cell, glm::i64vec3(desc.brick) * glm::i64vec3(level.stride));
     }
     grid.cells = grid_over(desc.volume.dims, grid.cell);

@@ -15,6 +15,7 @@ namespace voxloom::slicer {
 struct Page {
     BrickId brick;                // that is drawn; of merged pages the first one, and its level counts
     Box cell;                     // voxels of level 0
+    int cell_level = 0;           // it is as large as a brick of this one
     std::array<float, 8> blend{};
     std::optional<BrickId> parent = std::nullopt;  // where it blends
     bool merged = false;          // of bricks that lie side by side in the texture too

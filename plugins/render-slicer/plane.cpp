@@ -7,6 +7,7 @@
 #include "core/data/selection.h"
 #include "core/gpu/thread.h"
 #include "plugins/render-slicer/brick_scene.h"
+#include "plugins/render-slicer/decoding.h"
 #include "plugins/render-slicer/keep.h"
 #include "plugins/render-slicer/modules.h"
 #include "plugins/render-slicer/picture.h"
@@ -26,7 +27,8 @@ drawn at the finest level.
 
 `blend: one-pass` mixes the values of a brick and its parent, then classifies; `two-pass` classifies both,
 and adds them with their weights, as LaMar et al. do. The two differ where colours are not linear in the
-value. `borders` shows the bricks: black, red, green and yellow from the finest level on.
+value. Where somebody looks, what is decoded is shown after `first_picture` seconds, coarse where the fine bricks are
+still missing, and finer as they come, the ones of coarse levels first. `borders` shows the bricks: black, red, green and yellow from the finest level on.
 
 **Use it** to look into a volume, whatever its size. **Do not use it** for slices along an axis of a volume in
 memory, which a crop shows as well.
@@ -84,6 +86,7 @@ struct Cut {
     int component = 0;
     glm::dvec4 background;
     std::uint64_t gpu_bytes = 0;
+    double first_picture = 0, bytes_per_second = 0;
 };
 
 gpu::ProgramPtr assemble(const BrickScene& scene, const Cut& cut) {
@@ -153,24 +156,11 @@ std::shared_ptr<Image> draw(const gpu::Program& program, const Cut& cut, Evaluat
     return read_back(target);
 }
 
-std::shared_ptr<Image> draw_bricks(const BricksPtr& bricks, const Selection& selection, const Cut& cut, Evaluation& ev) {
-    const VolumeDesc& desc = bricks->desc().volume;
-    auto empty = [&] {
-        auto image = std::make_shared<Image>(cut.size, Image::Format::rgba32f);
-        std::ranges::fill(image->rgba32f(), glm::vec4(0.0f));
-        return image;
-    };
-    if (desc.voxels() == 0) return empty();
-    BrickRequest request;
-    request.component = cut.component;
-    request.gpu_bytes = cut.gpu_bytes;
-    request.visible = [](double, double, double) { return true; };
-    const BrickScene scene = prepare_bricks(bricks, &selection, request, ev);
-    if (!scene.field) return empty();
-
+std::shared_ptr<Image> draw_scene(const BrickScene& scene, const VolumeDesc& desc, const glm::dvec4& plane, const Cut& cut,
+                                  Evaluation& ev) {
     const gpu::ProgramPtr program = assemble(scene, cut);
     scene.set(*program);
-    set_rays(*program, *ev.input<Camera>("camera"), desc, cut.size, *selection.plane);
+    set_rays(*program, *ev.input<Camera>("camera"), desc, cut.size, plane);
     ValueRange range = scene.range;
     const gpu::VoxelSource& voxels = scene.field->voxels;
     if (range.min == range.max) range = {range.min - 1, range.max + 1};
@@ -182,7 +172,32 @@ std::shared_ptr<Image> draw_bricks(const BricksPtr& bricks, const Selection& sel
     program->set("emission_bins", float(kBins));
     program->set("opaque", cut.opaque ? 1.0f : 0.0f);
     program->set("borders", float(cut.borders));
-    return draw(*program, cut, ev);
+    std::shared_ptr<Image> image = draw(*program, cut, ev);
+    for (glm::vec4& c : image->rgba32f()) c += (1.0f - c.a) * glm::vec4(cut.background);
+    return image;
+}
+
+std::shared_ptr<Image> draw_bricks(const BricksPtr& bricks, const Selection& selection, const Cut& cut, Evaluation& ev) {
+    const VolumeDesc& desc = bricks->desc().volume;
+    BrickRequest request;
+    request.component = cut.component;
+    request.gpu_bytes = cut.gpu_bytes;
+    request.visible = [](double, double, double) { return true; };
+    BrickPlan plan;
+    if (desc.voxels() > 0) plan = plan_bricks(bricks, &selection, request, ev);
+    if (plan.pages.empty()) {
+        auto image = std::make_shared<Image>(cut.size, Image::Format::rgba32f);
+        std::ranges::fill(image->rgba32f(), glm::vec4(cut.background));
+        return image;
+    }
+    if (const std::vector<BrickId> missing = plan.missing(); !missing.empty() && ev.wants_provisional() && cut.first_picture > 0) {
+        Decoding decoding(bricks, missing, Atlas::kReach, cut.bytes_per_second);
+        while (!decoding.wait(cut.first_picture, ev.stop())) {
+            ev.provisional("image", ImagePtr(draw_scene(load_bricks(plan, request, ev, true), desc, *selection.plane, cut, ev)));
+            ev.count("provisional pictures");
+        }
+    }
+    return draw_scene(load_bricks(plan, request, ev), desc, *selection.plane, cut, ev);
 }
 
 void describe(Description& d) {
@@ -208,6 +223,8 @@ void evaluate(Evaluation& ev) {
     cut.borders = p.real("borders");
     cut.component = int(p.integer("component"));
     cut.gpu_bytes = std::uint64_t(p.integer("gpu_memory")) << 20;
+    cut.first_picture = p.real("first_picture");
+    cut.bytes_per_second = p.real("bandwidth") * 1048576.0;
     const std::vector<double>& b = p.numbers("background");
     cut.background = glm::dvec4(glm::dvec3(b[0], b[1], b[2]) * b[3], b[3]);
 
@@ -223,10 +240,9 @@ void evaluate(Evaluation& ev) {
             selection = finest_on(bricks->desc(), plane);
         }
     }
-    std::shared_ptr<Image> image = draw_bricks(bricks, *selection, cut, ev);
-    for (glm::vec4& c : image->rgba32f()) c += (1.0f - c.a) * glm::vec4(cut.background);
+    const ImagePtr image = draw_bricks(bricks, *selection, cut, ev);
     Keep::instance().shrink(cut.gpu_bytes);
-    ev.output("image", ImagePtr(image));
+    ev.output("image", image);
 }
 
 }  // namespace
@@ -271,6 +287,10 @@ NodeType plane_node() {
             .range(0, 64).slider(0, 4).in_unit("pixels").in_group("picture"),
         param::integer("gpu_memory", 2048, "Textures kept between two pictures; three quarters of it may be bricks.")
             .range(0, 1 << 20).in_unit("MiB").in_group("speed").for_experts().changes(Affects::cost),
+        first_picture_param(),
+        param::real("bandwidth", 0, "Compressed bricks decoded a second while somebody looks on, so that other readers of a "
+                                    "slow disk or network have their share; 0: no limit.")
+            .range(0, 1e6).slider(0, 100).in_unit("MiB/s").in_group("speed").for_experts().changes(Affects::cost),
     };
     t.method = kMethod;
     t.describe = describe;

@@ -11,6 +11,7 @@
 #include "core/gpu/thread.h"
 #include "plugins/render-slicer/blocks.h"
 #include "plugins/render-slicer/brick_scene.h"
+#include "plugins/render-slicer/decoding.h"
 #include "plugins/render-slicer/keep.h"
 #include "plugins/render-slicer/modules.h"
 #include "plugins/render-slicer/picture.h"
@@ -204,11 +205,18 @@ bool is_classified_before(const Scene& scene) {
     return scene.settings.classification == S::Classification::pre && is_slabs(scene.settings) && !scene.transfer->two;
 }
 
-// Bricks in place of a volume.
-void prepare_bricks(const Scene& scene, const View& view, Evaluation& ev, Prepared& p) {
+// Bricks in place of a volume: what is asked for, and what that comes to.
+struct BrickJob {
+    BrickRequest request;
+    BrickPlan plan;
+};
+
+// `view` lives as long as the job.
+BrickJob plan_bricks(const Scene& scene, const View& view, Evaluation& ev) {
     const S& s = scene.settings;
     const bool cubic = s.reconstruction == S::Reconstruction::tricubic;
-    BrickRequest request;
+    BrickJob job;
+    BrickRequest& request = job.request;
     request.component = s.component;
     request.apron = apron_for(scene);
     request.gpu_bytes = s.gpu_bytes;
@@ -217,7 +225,7 @@ void prepare_bricks(const Scene& scene, const View& view, Evaluation& ev, Prepar
         request.transfer = scene.transfer;
         request.slab = view.plane_distance;
     }
-    request.visible = [&](double least, double lo, double hi) {
+    request.visible = [&scene, cubic](double least, double lo, double hi) {
         if (cubic && lo < hi) {
             const double middle = 0.5 * lo + 0.5 * hi, half = kCubicOvershoot * (0.5 * hi - 0.5 * lo);
             lo = middle - half;
@@ -225,8 +233,13 @@ void prepare_bricks(const Scene& scene, const View& view, Evaluation& ev, Prepar
         }
         return is_visible(scene, least, lo, hi);
     };
-    request.in_view = [&](const Box& box) { return view.may_meet(box); };
-    p.bricks = slicer::prepare_bricks(std::get<BricksPtr>(scene.source), scene.selection.get(), request, ev);
+    request.in_view = [&view](const Box& box) { return view.may_meet(box); };
+    job.plan = slicer::plan_bricks(std::get<BricksPtr>(scene.source), scene.selection.get(), request, ev);
+    return job;
+}
+
+void prepare_bricks(BrickJob& job, bool what_is_there, Evaluation& ev, Prepared& p) {
+    p.bricks = load_bricks(job.plan, job.request, ev, what_is_there);
     p.field = p.bricks->field;
     p.range = p.bricks->range;
     p.occupancy = p.bricks->occupancy;
@@ -234,10 +247,10 @@ void prepare_bricks(const Scene& scene, const View& view, Evaluation& ev, Prepar
     p.block_size = p.bricks->block_size;
     p.block_grid = p.bricks->blocks;
     if (!p.bricks->field) return;
-    if (request.gradient_side)
-        p.gradient = std::make_shared<Prepared::Stored>(
-            Prepared::Stored{p.bricks->atlas->gradients(), p.bricks->atlas->texels().gradient_scale});
-    if (request.transfer) p.classified = p.bricks->atlas->colours();
+    const Atlas& atlas = *p.bricks->atlas;
+    if (job.request.gradient_side)
+        p.gradient = std::make_shared<Prepared::Stored>(Prepared::Stored{atlas.gradients(), atlas.texels().gradient_scale});
+    if (job.request.transfer) p.classified = atlas.colours();
 }
 
 void prepare_volume(const Scene& scene, const View& view, const std::shared_ptr<const void>& owner,
@@ -277,14 +290,14 @@ void prepare_volume(const Scene& scene, const View& view, const std::shared_ptr<
 }
 
 // `view` gets the slices of the level where only one is drawn.
-Prepared prepare(const Scene& scene, View& view, const VolumeDesc& desc, bool as_bricks,
+Prepared prepare(const Scene& scene, View& view, const VolumeDesc& desc, BrickJob* bricks, bool what_is_there,
                  const std::shared_ptr<const void>& owner, Evaluation& ev) {
     const S& s = scene.settings;
     const TransferFunction& tf = *scene.transfer;
     Keep& keep = Keep::instance();
     Prepared p;
-    if (as_bricks)
-        prepare_bricks(scene, view, ev, p);
+    if (bricks)
+        prepare_bricks(*bricks, what_is_there, ev, p);
     else
         prepare_volume(scene, view, owner, ev, p);
     if (p.seen == 0) return p;
@@ -657,6 +670,32 @@ ImagePtr only_background(const S& s) {
     return image;
 }
 
+// What is there of the bricks, a quarter the size, as long as others are decoded: the first time after
+// first_picture seconds, then whenever as much time has gone by as the last picture took, or as that.
+void show_while_decoding(const Scene& scene, const View& view, const VolumeDesc& desc, BrickJob& job,
+                         const std::shared_ptr<const void>& owner, Evaluation& ev) {
+    const S& s = scene.settings;
+    const std::vector<BrickId> missing = job.plan.missing();
+    if (missing.empty()) return;
+    Decoding decoding(job.plan.bricks, missing, Atlas::kReach, 0);
+    double wait = s.first_picture;
+    while (!decoding.wait(wait, ev.stop())) {
+        const std::int64_t start = wall_ns();
+        View slices = view;
+        const Prepared p = prepare(scene, slices, desc, &job, true, owner, ev);
+        if (p.seen > 0) {
+            const Lighting lighting(scene, slices);
+            const gpu::ProgramPtr program = assemble(scene, p, lighting);
+            set_uniforms(*program, scene, slices, desc, p, lighting);
+            Target coarse(glm::max(s.size / 4, glm::ivec2(1)));
+            draw(*program, coarse, slices, background(s), ev);
+            ev.provisional("image", enlarged(*read_back(coarse), s.size));
+            ev.count("provisional pictures");
+        }
+        wait = std::max(s.first_picture, double(wall_ns() - start) * 1e-9);
+    }
+}
+
 // Whether one texture can hold the volume, and gpu_memory, or at least a gigabyte, has room for it.
 bool fits_as_volume(const VolumeDesc& desc, std::uint64_t gpu_bytes) {
     const int limit = gpu::context_info().max_texture_3d;
@@ -696,8 +735,12 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
     }
     if (as_bricks) view.limit_reach(Atlas::kReach - (s.reconstruction == S::Reconstruction::tricubic));
 
+    const View planned = view;
+    std::optional<BrickJob> job;
+    if (as_bricks) job = plan_bricks(scene, planned, ev);
+    if (job && ev.wants_provisional() && s.first_picture > 0) show_while_decoding(scene, view, desc, *job, owner, ev);
     const std::int64_t start = wall_ns();
-    Prepared prepared = prepare(scene, view, desc, as_bricks, owner, ev);
+    Prepared prepared = prepare(scene, view, desc, job ? &*job : nullptr, false, owner, ev);
     ev.count("prepare ms", double(wall_ns() - start) * 1e-6);
     ev.count("slices", std::ceil(view.planes));
     if (prepared.seen == 0) {

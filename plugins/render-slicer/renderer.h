@@ -33,6 +33,7 @@ struct Settings {
     int block_size = 8;
     glm::dvec4 background{0, 0, 0, 1};
     std::uint64_t gpu_bytes = 0;
+    double first_picture = 0;   // seconds until what is decoded of bricks is shown; 0: not before all is
 };
 
 struct Scene {

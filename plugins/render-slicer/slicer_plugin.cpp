@@ -37,6 +37,7 @@ Settings settings_of(const Params& p) {
     const std::vector<double>& b = p.numbers("background");
     s.background = {b[0], b[1], b[2], b[3]};
     s.gpu_bytes = std::uint64_t(p.integer("gpu_memory")) << 20;
+    s.first_picture = p.real("first_picture");
     return s;
 }
 
@@ -142,6 +143,7 @@ NodeType render_node() {
         param::integer("gpu_memory", 2048, "Textures kept between two pictures; three quarters of it may be bricks.")
             .range(0, 1 << 20).in_unit("MiB").in_group("speed").for_experts().changes(Affects::cost),
     };
+    t.params.push_back(first_picture_param());
     t.method = R"(**Method.** Planes normal to the view axis, anchored at the middle of the volume and common to all
 blocks, cut every ray into slabs; the parts of a slab at the volume's faces, at the near plane and at the
 eye count with their exact thickness. Slabs are composited front to back in 32-bit floats. With
@@ -158,7 +160,9 @@ Where three quarters of `gpu_memory` have room for whole levels, bricks lie in o
 and what is drawn of one level alone is drawn as a volume is. Else they lie in slots, least recently used out
 first, and `gpu_memory` must hold the bricks of one picture. Between levels a ray goes from brick to brick, with
 the slices and the table of each one's level; slabs are cut at the faces, so what a ray meets does not depend on
-how the volume is cut. Where `lod.balance` says so a brick blends into its coarser neighbours.
+how the volume is cut. Where `lod.balance` says so a brick blends into its coarser neighbours. Where somebody looks,
+what is decoded is shown after `first_picture` seconds, and better and better while other threads decode the rest;
+the last picture does not depend on that.
 
 **When to use.** For looking at volumes, from 8-bit scans to floats, at any quality: `slice_distance` trades
 time for error, 2 for a quick look, 0.5 for a still.
