@@ -338,6 +338,37 @@ TEST_F(Window, picturesOfTwoBranchesAreComparedWithLinkedCameras) {
     keep(editor.screenshot(), "table");
 }
 
+TEST_F(Window, codecsAreComparedInNumbersSweptAndGoneBackTo) {
+    const std::string text = R"(voxloom: 1
+outputs: [a-view.image, b-view.image]
+nodes:
+  - { id: head, type: readers.phantom, set: { kind: ct-head, dims: [24, 24, 24], type: u8 } }
+  - { id: a, type: wavelet.encode, in: { volume: head.volume }, set: { target: max-error, max_error: 8 } }
+  - { id: b, type: wavelet.encode, in: { volume: head.volume }, set: { target: max-error, max_error: 2 } }
+  - { id: tf, type: scene.transfer, in: { fit: head.volume } }
+  - { id: camera, type: scene.camera, in: { fit: head.volume } }
+  - { id: a-view, type: slicer.render, in: { source: a.bricks, transfer: tf.transfer, camera: camera.camera }, set: { size: [48, 48] } }
+  - { id: b-view, type: slicer.render, in: { source: b.bricks, transfer: tf.transfer, camera: camera.camera }, set: { size: [48, 48] } }
+)";
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "a-view.image"); });
+    editor.key("c");
+    editor.with("compare-table");
+    editor.wait_for("two settings", [](const json& s) { return s["tried"] == 2; });
+    editor.click("sweep:a");
+    json s = editor.wait_for("the sweep's end", [](const json& now) { return !now["sweeping"].get<bool>() && !now["busy"].get<bool>() && now["tried"].get<int>() > 5; });
+    EXPECT_EQ(s["text"], text) << "a sweep leaves the graph as it is";
+    s = editor.wait_for("the document's picture again", [](const json& now) { return shows_final(now, "a-view.image"); });
+    keep(editor.screenshot(), "compare-numbers");
+    editor.click("tried:3");
+    s = editor.wait_for("the parameters of a point", [&](const json& now) { return now["text"] != text && shows_final(now, "a-view.image"); });
+    EXPECT_NE(Document::parse(s["text"]).graph().find("a")->params.at(1).yaml.text, "8");
+    editor.key("z", "ctrl");
+    editor.wait_for("undo", [&](const json& now) { return now["text"] == text; });
+}
+
 // As somebody who has read nothing: every click, key and typed word counts.
 TEST_F(Window, aNewcomerComparesTwoCodecsOnTheEngineInFewActions) {
     VOXLOOM_NEEDS_DATA(data);

@@ -193,6 +193,7 @@ void Evaluator::publish(const Plan& plan, const Request& request) {
     std::erase_if(state_.values, [&](const auto& entry) {
         return plan.find(std::string_view(entry.first).substr(0, entry.first.find('.'))) < 0;
     });
+    state_.graph = std::make_shared<const Graph>(request.graph);
     state_.problems.clear();
     if (!plan.nodes.empty()) state_.problems = plan.problems;  // an empty graph is a beginning
     state_.warnings = plan.warnings;
@@ -222,6 +223,8 @@ void Evaluator::collect(const Plan::Node& node, const Hash& key, const ResultCac
         status.bytes = result.bytes;
         status.measurements = result.measurements;
         status.warnings = result.warnings;
+        auto took = wall_seconds_.find(key);
+        status.wall_seconds = took == wall_seconds_.end() ? 0 : took->second;
     }
     for (std::size_t o = 0; o < result.outputs.size(); ++o) {
         const std::string port = node.id + "." + node.type->outputs[o].key;
@@ -256,6 +259,7 @@ void Evaluator::state_changed(int index, const NodeReport& report) {
     auto found = state_.nodes.find(report.id);
     if (found == state_.nodes.end()) return;  // removed meanwhile
     NodeStatus& status = found->second;
+    if (report.state == NodeState::done) wall_seconds_[key] = report.wall_seconds;
     if (status.key == key) {
         status.state = report.state == NodeState::cancelled ? NodeState::waiting : report.state;
         status.message = report.error;

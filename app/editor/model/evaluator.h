@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include "core/graph/evaluate.h"
@@ -29,7 +30,7 @@ struct NodeStatus {
     std::string what;          // it is doing
     std::string message;       // the sentence of a failure or of the check, or why the node is off
     std::vector<std::string> warnings;
-    double wall_seconds = 0;
+    double wall_seconds = 0;   // of the run that made what is there; 0: not known
     std::uint64_t bytes = 0;   // of its outputs
     std::map<std::string, std::pair<double, std::string>> measurements;
     std::vector<ValueDesc> outputs;  // described before it ran, by index of the type's outputs
@@ -61,6 +62,7 @@ class Evaluator final : RunObserver {
         std::map<std::string, NodeStatus> nodes;
         std::map<std::string, LiveValue> values;    // images, tables, cameras and transfer functions, by "node.port"
         std::map<std::string, std::weak_ptr<const Volume>> volumes;  // as long as the cache keeps them
+        std::shared_ptr<const Graph> graph;         // that all of this is of
         std::vector<Problem> problems;
         std::vector<std::string> warnings;
         double wall_seconds = 0;                    // of the last whole run
@@ -111,6 +113,7 @@ class Evaluator final : RunObserver {
     std::int64_t submitted_ns_ = 0;
     bool picture_pending_ = false;
     std::uint64_t serial_ = 0;
+    std::unordered_map<Hash, double, HashOfHash> wall_seconds_;  // of every result that was made here
 
     // Of the run in progress; written by its thread alone.
     const Plan* plan_ = nullptr;

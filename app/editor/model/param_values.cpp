@@ -1,5 +1,6 @@
 #include "app/editor/model/param_values.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace voxloom::editor {
@@ -13,6 +14,15 @@ ParamValue value_of(const GraphNode& node, const ParamSpec& spec) {
                 return *value;
             }
     return spec.initial;
+}
+
+bool is_in_use(const GraphNode& node, const NodeType& type, const ParamSpec& spec) {
+    const ParamSpec* other = spec.shown_if_key.empty() ? nullptr : type.find_param(spec.shown_if_key);
+    if (!other) return true;
+    const ParamValue value = value_of(node, *other);
+    const auto* text = std::get_if<std::string>(&value);
+    const std::string now = text ? *text : to_yaml(value);
+    return std::ranges::find(spec.shown_if_values, now) != spec.shown_if_values.end();
 }
 
 double short_number(double v) {

@@ -2,11 +2,15 @@
 #pragma once
 
 #include "core/graph/document.h"
+#include "core/graph/node.h"
 
 namespace voxloom::editor {
 
 // The value of a parameter as the document has it, or its default.
 ParamValue value_of(const GraphNode& node, const ParamSpec& spec);
+
+// Whether another parameter has not made it meaningless (ParamSpec::shown_if_key).
+bool is_in_use(const GraphNode& node, const NodeType& type, const ParamSpec& spec);
 
 // Six significant digits: what a hand can aim at, and what people can read in the file.
 double short_number(double v);

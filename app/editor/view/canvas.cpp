@@ -102,6 +102,7 @@ void show_tooltip(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
 }
 
 void mark_everything(Editor& editor) {
+    if (!editor.marks_wanted) return;
     const Canvas& canvas = editor.canvas;
     const double reach = 4 * theme().scale;
     mark(editor, "canvas", im(canvas.lo), im(canvas.lo + canvas.size));

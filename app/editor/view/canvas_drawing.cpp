@@ -249,7 +249,6 @@ void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire
     Pen pen(canvas);
     const ImVec2 lo = im(canvas.lo), hi = im(canvas.lo + canvas.size);
     pen.list.PushClipRect(lo, hi, true);
-    pen.list.AddRectFilled(lo, hi, t.canvas);
     draw_grid(pen, canvas.lo, canvas.size);
     draw_notes(pen, editor);
     for (std::size_t i = 0; i < wires.size(); ++i) {

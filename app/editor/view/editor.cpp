@@ -44,7 +44,7 @@ void mark(Editor& editor, std::string name) {
 }
 
 void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi) {
-    editor.marks.push_back({std::move(name), lo, hi});
+    if (editor.marks_wanted) editor.marks.push_back({std::move(name), lo, hi});
 }
 
 const NodeStatus* status_of(const Editor& editor, const std::string& node) {
@@ -59,6 +59,8 @@ void begin_document(Editor& editor, Workspace work) {
     editor.work = std::move(work);
     editor.texts.clear();
     editor.id_of.clear();
+    editor.tried.clear();
+    editor.sweep.reset();
     for (Picture& picture : editor.viewport.pictures) picture.port = {};
     editor.viewport.zoom = 0;
     editor.start_page = false;
@@ -181,14 +183,15 @@ bool same_results(const Graph& a, const Graph& b) {
     return x.file == y.file && same_content(x, y);
 }
 
-void submit(Editor& editor, bool coarse, bool write) {
+void submit(Editor& editor, const Graph& graph, bool coarse, bool write) {
     Evaluator::Request request;
-    request.graph = editor.work.graph();
+    request.graph = graph;
     request.watched = editor.watched;
     request.coarse = coarse;
     request.write = write;
     request.output_folder = editor.output_folder;
-    editor.submitted = request.graph;
+    editor.submitted = editor.work.graph();
+    editor.submitted_text = editor.work.document.text();
     editor.submitted_coarse = coarse;
     editor.ever_submitted = true;
     editor.evaluator.submit(std::move(request));
@@ -196,16 +199,44 @@ void submit(Editor& editor, bool coarse, bool write) {
 
 }  // namespace
 
+namespace {
+
+// One value after the other, each when the one before has been computed; then the document again, which
+// any change of it ends the sweep for.
+void go_on_with_sweep(Editor& editor) {
+    Sweep& sweep = *editor.sweep;
+    if (!same_results(editor.submitted, editor.work.graph())) return editor.sweep.reset();
+    if (editor.live.busy) return;
+    if (sweep.next < sweep.values.size()) return submit(editor, graph_with(editor.work.graph(), sweep, sweep.next++), false, false);
+    editor.sweep.reset();
+}
+
+}  // namespace
+
 void submit_changes(Editor& editor) {
+    if (editor.viewport.mode != Viewport::Mode::single) {
+        update_branches(editor);
+        collect_tried(editor.tried, editor.branches, editor.live);
+    }
+    if (editor.sweep) {
+        go_on_with_sweep(editor);
+        if (editor.sweep) return;
+        editor.ever_submitted = false;
+    }
     std::vector<WireEnd> shown = shown_ports(editor);
     const bool others = !std::equal(shown.begin(), shown.end(), editor.watched.begin(), editor.watched.end(), same_end);
     if (others) editor.watched = std::move(shown);
-    const bool changed = !editor.ever_submitted || others || !same_results(editor.submitted, editor.work.graph());
-    if (changed || (editor.submitted_coarse && !editor.moving)) submit(editor, editor.moving, false);
+    bool changed = !editor.ever_submitted || others;
+    if (!changed && editor.submitted_text != editor.work.document.text()) {
+        changed = !same_results(editor.submitted, editor.work.graph());
+        editor.submitted_text = editor.work.document.text();
+    }
+    if (changed || (editor.submitted_coarse && !editor.moving)) submit(editor, editor.work.graph(), editor.moving, false);
 }
 
 void write_files(Editor& editor) {
-    submit(editor, false, true);
+    editor.sweep.reset();
+    submit(editor, editor.work.graph(), false, true);
     say(editor, "Writing files to " + fs::absolute(editor.output_folder).lexically_normal().string());
 }
 
@@ -274,9 +305,9 @@ void draw(Editor& editor) {
     const float top = ui(44), bottom = size.y - ui(28), gap = ui(5);
     const float x = std::round(size.x * editor.split_x), y = std::round(top + (bottom - top) * editor.split_y);
     region("toolbar", {0, 0}, {size.x, top}, ImGuiWindowFlags_NoScrollbar, {ui(10), ui(8)}, [&] { draw_toolbar(editor); });
-    region("graph", {0, top}, {x, bottom}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse, {0, 0},
+    region("graph", {0, top}, {x, bottom}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoBackground, {0, 0},
            [&] { draw_canvas(editor); });
-    region("picture", {x + gap, top}, {size.x, y}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse, {0, 0},
+    region("picture", {x + gap, top}, {size.x, y}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoBackground, {0, 0},
            [&] { draw_viewport(editor); });
     region("parameters", {x + gap, y + gap}, {size.x, bottom}, 0, {ui(14), ui(10)}, [&] { draw_parameters(editor); });
     region("status", {0, bottom}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, {ui(12), ui(5)}, [&] { draw_status_bar(editor); });

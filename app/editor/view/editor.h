@@ -14,6 +14,7 @@
 
 #include "app/editor/model/autosave.h"
 #include "app/editor/model/background.h"
+#include "app/editor/model/branch.h"
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
 #include "app/editor/model/histogram.h"
@@ -152,7 +153,13 @@ struct Editor {
     double message_until = 0;
     bool message_is_error = false;
 
+    std::vector<Branch> branches;  // of what is looked at
+    std::string branches_text;     // of the document that they were found in
+    std::vector<Tried> tried;   // settings of codecs that were looked at, oldest first
+    std::optional<Sweep> sweep; // in progress: evaluates other graphs than the document
+
     Graph submitted;            // as the evaluator has it
+    std::string submitted_text; // of the document that was found to have the same results
     std::vector<WireEnd> watched;
     bool submitted_coarse = false, ever_submitted = false, moving = false;
     double moving_until = 0;    // a wheel that turns has no button to let go
@@ -160,9 +167,11 @@ struct Editor {
 
     std::map<std::string, SmallPicture> thumbnails;  // by port
     std::vector<double> frame_seconds;          // of the newest frames, a ring
+    std::vector<double> frame_cpu_seconds;      // of the window's thread
     std::size_t frames_drawn = 0;
 
     std::vector<Mark> marks;
+    bool marks_wanted = false;  // somebody reads them
     Evaluator::State live;
     Background<Histogram> histograms;
     Background<Thumbnail> small_pictures;
@@ -208,6 +217,9 @@ void draw_canvas(Editor& editor);
 void draw_add_menu(Editor& editor);
 void draw_note_editor(Editor& editor);
 void draw_viewport(Editor& editor);
+void update_branches(Editor& editor);
+double compare_strip_height(const Editor& editor, double room);  // 0: there is none
+void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size);
 void draw_parameters(Editor& editor);
 bool has_transfer_editor(const NodeType& type);
 void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType& type);

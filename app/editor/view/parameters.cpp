@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/editor/model/param_values.h"
 #include "app/editor/view/actions.h"
 #include "app/editor/view/editor.h"
 #include "core/base/error.h"
@@ -41,14 +42,6 @@ Shown shown_value(const GraphNode& node, const ParamSpec& spec) {
 std::string text_of(const ParamValue& value) {
     if (auto* text = std::get_if<std::string>(&value)) return *text;
     return to_yaml(value);
-}
-
-bool is_shown(const GraphNode& node, const NodeType& type, const ParamSpec& spec) {
-    if (spec.shown_if_key.empty()) return true;
-    const ParamSpec* other = type.find_param(spec.shown_if_key);
-    if (!other) return true;
-    const std::string now = text_of(shown_value(node, *other).value);
-    return std::find(spec.shown_if_values.begin(), spec.shown_if_values.end(), now) != spec.shown_if_values.end();
 }
 
 struct Row {
@@ -344,7 +337,7 @@ void draw_groups(Editor& editor, const std::string& id, const NodeType& type) {
         const GraphNode* node = editor.work.graph().find(id);
         if (!node) return;
         for (const ParamSpec& spec : type.params) {
-            if (spec.group != group || !is_shown(*node, type, spec)) continue;
+            if (spec.group != group || !is_in_use(*node, type, spec)) continue;
             experts = experts || spec.expert;
             if (!spec.expert || editor.show_expert || find_param(*node, spec.key)) rows.push_back(&spec);
         }

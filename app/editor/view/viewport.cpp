@@ -278,7 +278,9 @@ std::vector<Cell> cells_of(const Viewport& view, glm::dvec2 lo, glm::dvec2 size,
 }  // namespace
 
 void draw_viewport(Editor& editor) {
-    const glm::dvec2 lo = vec(ImGui::GetCursorScreenPos()), size = vec(ImGui::GetContentRegionAvail());
+    const glm::dvec2 lo = vec(ImGui::GetCursorScreenPos()), room = vec(ImGui::GetContentRegionAvail());
+    const double strip = compare_strip_height(editor, room.y);
+    const glm::dvec2 size = room - glm::dvec2(0, strip);
     ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().dark ? IM_COL32(8, 9, 11, 255) : IM_COL32(40, 43, 48, 255));
     mark(editor, "picture", im(lo), im(lo + size));
     const std::vector<WireEnd> ports = shown_ports(editor);
@@ -307,6 +309,7 @@ void draw_viewport(Editor& editor) {
         ImGui::SameLine();
         action_button(editor, "fit-picture");
     }
+    if (strip > 0) draw_compare_strip(editor, lo + glm::dvec2(0, size.y), {size.x, strip});
 }
 
 }  // namespace voxloom::editor

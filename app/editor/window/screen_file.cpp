@@ -20,11 +20,12 @@ std::string screen_to_json(const Editor& editor) {
     json["file"] = editor.work.file.string();
     json["changed"] = editor.work.changed();
     json["busy"] = editor.live.busy || editor.moving || editor.submitted_coarse;
-    std::vector<double> frames = editor.frame_seconds;
-    std::ranges::sort(frames);
-    if (!frames.empty()) {
-        json["frame_seconds"]["median"] = quantile(frames, 0.5);
-        json["frame_seconds"]["p99"] = quantile(frames, 0.99);
+    for (auto [name, times] : {std::pair("frame_seconds", &editor.frame_seconds), {"frame_cpu_seconds", &editor.frame_cpu_seconds}}) {
+        std::vector<double> frames = *times;
+        std::ranges::sort(frames);
+        if (frames.empty()) continue;
+        json[name]["median"] = quantile(frames, 0.5);
+        json[name]["p99"] = quantile(frames, 0.99);
     }
     json["first_picture_seconds"] = editor.live.first_picture_seconds;
     json["run_seconds"] = editor.live.wall_seconds;
@@ -33,6 +34,8 @@ std::string screen_to_json(const Editor& editor) {
     json["text"] = editor.work.document.text();
     json["shown"] = nlohmann::json::array();
     for (const WireEnd& end : editor.watched) json["shown"].push_back(end.node + "." + end.port);
+    json["tried"] = editor.tried.size();
+    json["sweeping"] = editor.sweep.has_value();
     json["problems"] = editor.live.problems.size();
     for (const auto& [id, status] : editor.live.nodes) json["states"][id] = name_of(status.state);
     for (const auto& [port, value] : editor.live.values)

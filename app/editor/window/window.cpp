@@ -101,10 +101,21 @@ void write_screen(const Editor& editor, const fs::path& file) {
     out.commit();
 }
 
-void remember_frame(Editor& editor, double seconds) {
+void remember_frame(Editor& editor, double seconds, double cpu_seconds) {
     constexpr std::size_t kMostFrames = 600;
-    if (editor.frame_seconds.size() < kMostFrames) editor.frame_seconds.push_back(0);
-    editor.frame_seconds[editor.frames_drawn++ % kMostFrames] = seconds;
+    if (editor.frame_seconds.size() < kMostFrames) {
+        editor.frame_seconds.push_back(0);
+        editor.frame_cpu_seconds.push_back(0);
+    }
+    const std::size_t at = editor.frames_drawn++ % kMostFrames;
+    editor.frame_seconds[at] = seconds;
+    editor.frame_cpu_seconds[at] = cpu_seconds;
+}
+
+double thread_cpu_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return double(now.tv_sec) + double(now.tv_nsec) * 1e-9;
 }
 
 // Something changes by itself: a message goes, pictures take turns, what is not saved waits to be.
@@ -121,7 +132,9 @@ void draw_frame(Editor& editor, GLFWwindow* window) {
     glm::ivec2 size;
     glfwGetFramebufferSize(window, &size.x, &size.y);
     glViewport(0, 0, size.x, size.y);
-    glClearColor(0, 0, 0, 1);
+    // The canvas has this colour, and is not drawn again.
+    const ImVec4 clear = ImGui::ColorConvertU32ToFloat4(theme().canvas);
+    glClearColor(clear.x, clear.y, clear.z, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     if (editor.screenshot_wanted) take_screenshot(editor, size);
@@ -135,6 +148,7 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
     // Editors hold textures of the window's context, so they end before it.
     Editor editor(registry, settings_file(), [] { glfwPostEmptyEvent(); });
     editor.output_folder = arguments.out;
+    editor.marks_wanted = !arguments.screen.empty();
     float screen_scale = 1, ignored = 1;
     glfwGetWindowContentScale(window.get(), &screen_scale, &ignored);
     if (arguments.scale > 0) screen_scale = float(arguments.scale);
@@ -159,10 +173,10 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
             glfwSetWindowShouldClose(window.get(), GLFW_FALSE);
             unless_changed(editor, [&editor] { editor.quit = true; });
         }
-        const double begun = glfwGetTime();
+        const double begun = glfwGetTime(), cpu_begun = thread_cpu_seconds();
         if (editor.theme_changed) set_theme(editor, screen_scale);
         draw_frame(editor, window.get());
-        remember_frame(editor, glfwGetTime() - begun);
+        remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
         if (!arguments.screen.empty()) write_screen(editor, arguments.screen);
         // Software renderers do not wait for the screen.
         if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && spare > 0)

@@ -1,0 +1,172 @@
+// Below compared pictures: what each of their branches costs and how wrong it is, and a plot of all the
+// settings that were tried, to go back to any of them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "app/editor/view/editor.h"
+#include "core/base/error.h"
+#include "core/base/text.h"
+
+namespace voxloom::editor {
+
+namespace {
+
+constexpr double kText = 12, kLine = 15, kNames = 92, kColumn = 84;
+
+ImU32 color_of_branch(std::size_t k) {
+    const Theme& t = theme();
+    const ImU32 colors[] = {t.accent, t.warn, t.good, t.bad};
+    return colors[k % 4];
+}
+
+void say_at(ImVec2 at, ImU32 color, const std::string& text, double width) {
+    const std::string cut = shortened(text, ui(width), theme().body, ui(kText));
+    ImGui::GetWindowDrawList()->AddText(theme().body, ui(kText), at, color, cut.c_str());
+}
+
+std::string number(std::optional<double> v) { return v ? fmt::format("{:.4g}", *v) : "–"; }
+std::string seconds(std::optional<double> v) { return v ? human_seconds(*v) : "–"; }
+
+void draw_numbers(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo) {
+    static const char* const names[] = {"ratio", "bits per voxel", "PSNR, dB", "max error", "image RMSE", "encode", "decode", "frame"};
+    auto row_at = [&](std::size_t row) { return lo.y + ui(kLine * double(row)); };
+    for (std::size_t r = 0; r < std::size(names); ++r) say_at({lo.x, row_at(r + 1)}, theme().muted, names[r], kNames - 6);
+    for (std::size_t k = 0; k < branches.size(); ++k) {
+        const BranchNumbers n = numbers_of(branches[k], editor.live);
+        const std::string texts[] = {number(n.ratio), number(n.bits_per_voxel), number(n.psnr), number(n.max_error),
+                                     number(n.image_rmse), seconds(n.encode), seconds(n.decode), seconds(n.frame)};
+        const float x = lo.x + ui(kNames + kColumn * double(k));
+        say_at({x, lo.y}, color_of_branch(k), branches[k].picture.node, kColumn - 6);
+        for (std::size_t r = 0; r < std::size(texts); ++r) say_at({x, row_at(r + 1)}, theme().text, texts[r], kColumn - 6);
+    }
+    const ImVec2 hi{lo.x + ui(kNames + kColumn * double(branches.size())), row_at(std::size(names) + 1)};
+    mark(editor, "compare-table", lo, hi);
+    if (ImGui::IsMouseHoveringRect(lo, hi))
+        ImGui::SetTooltip("Encode: the codec's own time where it tells it, else its node's. Decode and frame: their nodes'.\n"
+                          "–: nothing in the graph measures it; metrics.volume, metrics.image and bricks.decode do.");
+}
+
+// Time against error, over the range of what was tried.
+struct Plot {
+    ImVec2 lo, hi;
+    double t0 = 0, t1 = 1, p0 = 0, p1 = 1;  // log10 of seconds, decibels
+
+    static double finite(double psnr) { return std::clamp(psnr, -50.0, 200.0); }  // exact is infinite
+    ImVec2 place(const Tried& t) const {
+        const double x = (std::log10(std::max(t.seconds, 1e-9)) - t0) / (t1 - t0), y = (finite(t.psnr) - p0) / (p1 - p0);
+        return {lo.x + float(x) * (hi.x - lo.x), hi.y - float(y) * (hi.y - lo.y)};
+    }
+};
+
+Plot plot_of(const std::vector<Tried>& tried, ImVec2 lo, ImVec2 hi) {
+    Plot plot{lo, hi};
+    if (tried.empty()) return plot;
+    plot.t0 = plot.p0 = 1e300;
+    plot.t1 = plot.p1 = -1e300;
+    for (const Tried& t : tried) {
+        const double x = std::log10(std::max(t.seconds, 1e-9)), y = Plot::finite(t.psnr);
+        plot.t0 = std::min(plot.t0, x), plot.t1 = std::max(plot.t1, x);
+        plot.p0 = std::min(plot.p0, y), plot.p1 = std::max(plot.p1, y);
+    }
+    const double dt = std::max((plot.t1 - plot.t0) * 0.08, 0.05), dp = std::max((plot.p1 - plot.p0) * 0.08, 0.5);
+    plot.t0 -= dt, plot.t1 += dt, plot.p0 -= dp, plot.p1 += dp;
+    return plot;
+}
+
+std::string text_of(const Tried& t) {
+    std::string text = fmt::format("{}: {}, {:.4g} dB", t.codec, human_seconds(t.seconds), t.psnr);
+    for (const GraphParam& param : t.params)
+        if (param.yaml.kind != GraphParam::Yaml::Kind::list) text += fmt::format("\n{}: {}", param.key, param.yaml.text);
+    return text + "\nClick: back to these parameters.";
+}
+
+void draw_tried(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo, ImVec2 hi) {
+    ImDrawList& list = *ImGui::GetWindowDrawList();
+    const Theme& t = theme();
+    list.AddRectFilled(lo, hi, t.canvas, ui(4));
+    const Plot plot = plot_of(editor.tried, {lo.x + ui(34), lo.y + ui(8)}, {hi.x - ui(8), hi.y - ui(20)});
+    list.AddRect(plot.lo, plot.hi, faded(t.border, 0.6f));
+    say_at({lo.x + ui(3), plot.lo.y}, t.muted, editor.tried.empty() ? "dB" : fmt::format("{:.0f}", plot.p1), 30);
+    say_at({lo.x + ui(3), plot.hi.y - ui(kText)}, t.muted, editor.tried.empty() ? "" : fmt::format("{:.0f}", plot.p0), 30);
+    const std::string right = editor.tried.empty() ? "" : human_seconds(std::pow(10, plot.t1));
+    say_at({plot.lo.x, plot.hi.y + ui(3)}, t.muted, editor.tried.empty() ? "time" : human_seconds(std::pow(10, plot.t0)), 60);
+    const float width = t.body->CalcTextSizeA(ui(kText), FLT_MAX, 0, right.c_str()).x;
+    say_at({plot.hi.x - width, plot.hi.y + ui(3)}, t.muted, right, 60);
+    say_at({plot.lo.x + ui(6), plot.hi.y - ui(kText + 4)}, faded(t.muted, 0.8f), "PSNR, dB, against encode time", double(plot.hi.x - plot.lo.x) / double(t.scale) - 10);
+
+    ImGui::SetCursorScreenPos(lo);
+    const bool clicked = ImGui::InvisibleButton("tried", {std::max(hi.x - lo.x, 1.f), std::max(hi.y - lo.y, 1.f)});
+    int near = -1;
+    double best = ui(9);
+    for (std::size_t i = 0; i < editor.tried.size(); ++i) {
+        const Tried& tried = editor.tried[i];
+        const auto branch = std::ranges::find_if(branches, [&](const Branch& b) { return b.codec == tried.codec; });
+        const ImVec2 p = plot.place(tried);
+        const NodeStatus* status = status_of(editor, tried.codec);
+        const bool now = status && status->key == tried.key;
+        const ImU32 color = branch == branches.end() ? t.muted : color_of_branch(std::size_t(branch - branches.begin()));
+        list.AddCircleFilled(p, ui(now ? 5 : 3.5), color, 12);
+        if (now) list.AddCircle(p, ui(7), t.text, 16);
+        mark(editor, fmt::format("tried:{}", i), {p.x - ui(4), p.y - ui(4)}, {p.x + ui(4), p.y + ui(4)});
+        if (const double d = glm::distance(vec(p), vec(ImGui::GetMousePos())); ImGui::IsItemHovered() && d < best) best = d, near = int(i);
+    }
+    if (near < 0) return tooltip("Every setting that was looked at: the time of encoding against the error of the volume.");
+    const Tried chosen = editor.tried[std::size_t(near)];
+    ImGui::SetTooltip("%s", text_of(chosen).c_str());
+    if (clicked) edit(editor, [&] { bring_back(editor.work.document, chosen, editor.registry); });
+}
+
+void draw_sweep_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at) {
+    ImGui::SetCursorScreenPos(at);
+    if (editor.sweep) {
+        const std::string text = fmt::format("Stop, {} of {}", std::min(editor.sweep->next, editor.sweep->values.size()), editor.sweep->values.size());
+        if (ImGui::SmallButton(text.c_str())) editor.sweep.reset();
+        mark(editor, "sweep-stop");
+        return;
+    }
+    std::set<std::string> codecs;
+    for (const Branch& branch : branches) {
+        if (branch.codec.empty() || !codecs.insert(branch.codec).second) continue;
+        const std::optional<Sweep> sweep = sweep_of(editor.work.graph(), editor.registry, branch.codec);
+        ImGui::BeginDisabled(!sweep);
+        if (ImGui::SmallButton(("Sweep " + branch.codec).c_str())) editor.sweep = sweep;
+        ImGui::EndDisabled();
+        mark(editor, "sweep:" + branch.codec);
+        tooltip(sweep ? fmt::format("Tries {} values of {}; the graph stays as it is.", sweep->values.size(), sweep->param)
+                      : "It has no parameter in use that trades speed for error.");
+        ImGui::SameLine();
+    }
+}
+
+}  // namespace
+
+// Found anew where the graph or what is looked at is another one.
+void update_branches(Editor& editor) {
+    auto same = [](const Branch& branch, const WireEnd& port) { return branch.picture.node == port.node && branch.picture.port == port.port; };
+    if (editor.branches_text == editor.work.document.text() && std::ranges::equal(editor.branches, editor.watched, same)) return;
+    editor.branches_text = editor.work.document.text();
+    editor.branches.clear();
+    for (const WireEnd& port : editor.watched) editor.branches.push_back(branch_of(editor.work.graph(), editor.registry, port));
+}
+
+double compare_strip_height(const Editor& editor, double room) {
+    if (editor.viewport.mode == Viewport::Mode::single) return 0;
+    const double height = double(ui(9 * kLine + 34));
+    return room > 1.6 * height ? height : 0;
+}
+
+void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size) {
+    const std::vector<Branch>& branches = editor.branches;
+    ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().panel);
+    const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(6));
+    draw_numbers(editor, branches, im(table));
+    draw_sweep_buttons(editor, branches, im(table + glm::dvec2(0, ui(9 * kLine + 3))));
+    const double left = lo.x + double(ui(kNames + kColumn * double(branches.size()) + 16));
+    if (left + double(ui(110)) > lo.x + size.x) return;  // no room for a plot
+    draw_tried(editor, branches, {float(left), float(lo.y + ui(6))}, {float(lo.x + size.x - ui(8)), float(lo.y + size.y - ui(6))});
+}
+
+}  // namespace voxloom::editor

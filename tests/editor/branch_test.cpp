@@ -1,0 +1,149 @@
+// What a picture's branch costs: found in the graph, read from what was measured, tried and gone back to.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "app/editor/model/branch.h"
+#include "core/base/error.h"
+
+namespace voxloom::editor {
+namespace {
+
+const char* const kText = R"(voxloom: 1
+nodes:
+  - { id: ct, type: test.read }
+  - { id: code, type: test.encode, in: { volume: ct.volume }, set: { steps: 3 } }
+  - { id: back, type: test.decode, in: { bricks: code.bricks } }
+  - { id: view, type: test.draw, in: { source: back.volume } }
+  - { id: direct, type: test.draw, in: { source: ct.volume } }
+  - { id: wrong, type: test.error, in: { volume: back.volume, reference: ct.volume } }
+  - { id: unlike, type: test.picture-error, in: { image: view.image, reference: direct.image } }
+)";
+
+struct Branches : ::testing::Test {
+    Registry nodes;
+    Document document = Document::parse(kText);
+    Evaluator::State state;
+
+    Branches() {
+        auto add = [&](const char* id, std::vector<PortSpec> inputs, std::vector<PortSpec> outputs, std::vector<ParamSpec> params = {}) {
+            NodeType type;
+            type.id = id;
+            type.title = type.doc = "test";
+            type.inputs = std::move(inputs);
+            type.outputs = std::move(outputs);
+            type.params = std::move(params);
+            type.evaluate = [](Evaluation&) {};
+            nodes.add(type);
+        };
+        add("test.read", {}, {{"volume", PortType::volume, "v"}});
+        add("test.encode", {{"volume", PortType::volume, "v"}}, {{"bricks", PortType::bricks, "b"}},
+            {param::choice("target", {"error", "steps"}, "steps", "Which."),
+             param::real("bound", 1, "Bound.").range(0.01, 10).slider(0.1, 10, Scale::logarithmic).shown_if("target", {"error"}).is_quality(),
+             param::integer("steps", 4, "Steps.").range(1, 5).slider(1, 5).is_quality()});
+        add("test.decode", {{"bricks", PortType::bricks, "b"}}, {{"volume", PortType::volume, "v"}});
+        add("test.draw", {{"source", {PortType::volume, PortType::bricks}, "s"}}, {{"image", PortType::image, "i"}});
+        add("test.error", {{"volume", PortType::volume, "v"}, {"reference", PortType::volume, "r"}}, {{"table", PortType::table, "t"}});
+        add("test.picture-error", {{"image", PortType::image, "v"}, {"reference", PortType::image, "r"}}, {{"table", PortType::table, "t"}});
+        state.graph = std::make_shared<const Graph>(document.graph());
+    }
+    Branch branch(const char* node) const { return branch_of(document.graph(), nodes, {node, "image", {}}); }
+    void finish(const std::string& id, double seconds, std::map<std::string, std::pair<double, std::string>> measurements = {}) {
+        NodeStatus& status = state.nodes[id];
+        status.state = NodeState::done;
+        status.wall_seconds = seconds;
+        status.measurements = std::move(measurements);
+        status.key = Hasher().text(id).value(double(seconds)).finish();
+    }
+    void table(const std::string& id, const std::string& column, double value) {
+        auto made = std::make_shared<Table>();
+        made->columns = {{"name", ""}, {column, ""}};
+        made->rows = {{std::string("x"), value}};
+        state.values[id + ".table"] = {TablePtr(made), true, 1};
+        finish(id, 1);
+    }
+};
+
+TEST_F(Branches, areFoundUpstreamAndByWhatMeasuresThem) {
+    const Branch b = branch("view");
+    EXPECT_EQ(b.codec, "code");
+    EXPECT_EQ(b.decoder, "back");
+    EXPECT_EQ(b.volume_error, "wrong");
+    EXPECT_EQ(b.image_error, "unlike");
+    const Branch plain = branch("direct");
+    EXPECT_EQ(plain.codec, "");
+    EXPECT_EQ(plain.volume_error, "") << "the error of another branch is none of this one";
+    EXPECT_EQ(plain.image_error, "") << "a reference is not what is measured";
+}
+
+TEST_F(Branches, numbersAreThoseThatWereMeasuredAndNoOthers) {
+    EXPECT_FALSE(numbers_of(branch("view"), state).ratio);
+    finish("code", 2.5, {{"ratio", {7, ""}}, {"psnr", {40, "dB"}}, {"codec time", {0.5, "s"}}});
+    finish("back", 0.25);
+    finish("view", 0);
+    BranchNumbers n = numbers_of(branch("view"), state);
+    EXPECT_EQ(n.ratio, 7);
+    EXPECT_EQ(n.psnr, 40);
+    EXPECT_EQ(n.encode, 0.5);
+    EXPECT_EQ(n.decode, 0.25);
+    EXPECT_FALSE(n.frame) << "kept from a run that nobody timed";
+    EXPECT_FALSE(n.image_rmse);
+    table("wrong", "psnr", 41);
+    table("unlike", "rmse", 0.01);
+    n = numbers_of(branch("view"), state);
+    EXPECT_EQ(n.psnr, 41) << "a measurement of the whole is better than the codec's own";
+    EXPECT_EQ(n.image_rmse, 0.01);
+    state.nodes["code"].state = NodeState::waiting;
+    state.values["wrong.table"].fresh = false;
+    n = numbers_of(branch("view"), state);
+    EXPECT_FALSE(n.ratio) << "of an older graph";
+    EXPECT_FALSE(n.psnr);
+}
+
+TEST_F(Branches, whatWasTriedIsKeptOnceAndComesBackInOneStep) {
+    std::vector<Tried> tried;
+    collect_tried(tried, {branch("view"), branch("direct")}, state);
+    EXPECT_TRUE(tried.empty());
+    finish("code", 1, {{"psnr", {40, "dB"}}});
+    collect_tried(tried, {branch("view")}, state);
+    collect_tried(tried, {branch("view")}, state);
+    ASSERT_EQ(tried.size(), 1u);
+    EXPECT_EQ(tried[0].seconds, 1);
+    document.set_param("code", "steps", std::int64_t(5));
+    document.set_param("code", "bound", 0.5);
+    const std::string before = document.text();
+    bring_back(document, tried[0], nodes);
+    EXPECT_EQ(document.text(), kText);
+    document.undo();
+    EXPECT_EQ(document.text(), before);
+    document.remove_node("code");
+    EXPECT_THROW(bring_back(document, tried[0], nodes), Error);
+    for (int i = 0; i < 600; ++i) {
+        finish("code", 2 + i, {{"psnr", {INFINITY, "dB"}}});
+        collect_tried(tried, {{{}, "code", {}, {}, {}}}, state);
+    }
+    EXPECT_EQ(tried.size(), 500u);
+    EXPECT_EQ(tried.back().seconds, 601);
+}
+
+TEST_F(Branches, aSweepGoesOverTheParameterThatIsInUse) {
+    std::optional<Sweep> sweep = sweep_of(document.graph(), nodes, "code");
+    ASSERT_TRUE(sweep);
+    EXPECT_EQ(sweep->param, "steps");
+    ASSERT_EQ(sweep->values.size(), 5u) << "whole numbers, each once";
+    EXPECT_EQ(sweep->values.front(), ParamValue(std::int64_t(1)));
+    document.set_param("code", "target", std::string("error"));
+    sweep = sweep_of(document.graph(), nodes, "code", 3);
+    ASSERT_TRUE(sweep);
+    EXPECT_EQ(sweep->param, "bound");
+    EXPECT_EQ(sweep->values, (std::vector<ParamValue>{0.1, 1.0, 10.0}));
+    const std::string before = document.text();
+    const Graph changed = graph_with(document.graph(), *sweep, 2);
+    EXPECT_EQ(changed.find("code")->params.back().yaml.text, "10");
+    EXPECT_EQ(document.text(), before);
+    EXPECT_FALSE(sweep_of(document.graph(), nodes, "back"));
+    EXPECT_FALSE(sweep_of(document.graph(), nodes, "nobody"));
+}
+
+}  // namespace
+}  // namespace voxloom::editor
