@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/editor/model/branch.h"
+#include "app/editor/model/plane_control.h"
 #include "core/base/error.h"
 
 namespace voxloom::editor {
@@ -143,6 +144,62 @@ TEST_F(Branches, aSweepGoesOverTheParameterThatIsInUse) {
     EXPECT_EQ(document.text(), before);
     EXPECT_FALSE(sweep_of(document.graph(), nodes, "back"));
     EXPECT_FALSE(sweep_of(document.graph(), nodes, "nobody"));
+}
+
+// --- cutting planes ------------------------------------------------------------------------------
+
+struct Planes : ::testing::Test {
+    Registry nodes;
+    Workspace work;
+    Evaluator::State state;
+
+    Planes() {
+        auto add = [&](const char* id, PortType gives) {
+            NodeType type;
+            type.id = id;
+            type.title = type.doc = "test";
+            type.inputs = {{"source", PortType::bricks, "s", true}, {"selection", PortType::selection, "s", true}};
+            type.outputs = {{"out", gives, "o"}};
+            type.params = {param::vector("normal", {0, 0, 1}, "Normal."), param::vector("origin", {0.5, 0.5, 0.5}, "Origin.")};
+            type.evaluate = [](Evaluation&) {};
+            nodes.add(type);
+        };
+        add("test.draw", PortType::image);
+        add("test.select", PortType::selection);
+        work.document.add_node("bricks", "test.unknown");
+        work.document.add_node("view", "test.draw");
+        work.document.connect("bricks", "out", "view", "source");
+        VolumeDesc desc;
+        desc.dims = {11, 21, 1};
+        desc.set_spacing_origin({1, 0.5, 1000}, {100, 0, -3});
+        state.nodes["bricks"].outputs = {ValueDesc(desc)};
+    }
+    Plane now(const char* node = "view") const { return *plane_now(work.graph(), nodes, node, state); }
+};
+
+TEST_F(Planes, areOfTheSelectionWhereThereIsOne) {
+    EXPECT_EQ(plane_of(work.graph(), nodes, "view"), "view");
+    work.document.add_node("select", "test.select");
+    work.document.connect("select", "out", "view", "selection");
+    EXPECT_EQ(plane_of(work.graph(), nodes, "view"), "select");
+    EXPECT_FALSE(plane_of(work.graph(), nodes, "bricks"));
+    EXPECT_FALSE(plane_now(work.graph(), nodes, "select", state)) << "nothing says of which volume";
+    work.document.set_param("view", "normal", std::vector<double>{0, 0, 0});
+    EXPECT_FALSE(plane_now(work.graph(), nodes, "view", state));
+}
+
+TEST_F(Planes, moveAlongTheirNormalInTheWorldAndStayInTheBox) {
+    EXPECT_EQ(now().point, glm::dvec3(105, 5, -3));
+    turn_plane(work, "view", {0, 10, 0});
+    EXPECT_EQ(now().normal, glm::dvec3(0, 1, 0));
+    move_plane(work, "view", now(), 2);
+    EXPECT_NEAR(now().point.y, 7, 1e-9);
+    EXPECT_NEAR(now().point.x, 105, 1e-9);
+    move_plane(work, "view", now(), 1e9);
+    EXPECT_NEAR(now().point.y, 10, 1e-9) << "the last voxel";
+    const std::string before = work.document.text();
+    turn_plane(work, "view", {0, 0, 0});
+    EXPECT_EQ(work.document.text(), before);
 }
 
 }  // namespace

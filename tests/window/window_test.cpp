@@ -369,6 +369,37 @@ nodes:
     editor.wait_for("undo", [&](const json& now) { return now["text"] == text; });
 }
 
+TEST_F(Window, aCuttingPlaneIsMovedAndTurnedInItsPicture) {
+    const std::string text = R"(voxloom: 1
+nodes:
+  - { id: head, type: readers.phantom, set: { kind: ct-head, dims: [32, 32, 32], type: u8 } }
+  - { id: pyramid, type: bricks.pyramid, in: { volume: head.volume } }
+  - { id: tf, type: scene.transfer, in: { fit: head.volume }, set: { preset: ramp } }
+  - { id: camera, type: scene.camera, in: { fit: head.volume }, set: { azimuth: 40, framing: box } }
+  - { id: cut, type: slicer.plane, in: { source: pyramid.bricks, transfer: tf.transfer, camera: camera.camera }, set: { size: [100, 100] } }
+)";
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "cut.image"); });
+    auto drag = [&](const char* handle) {
+        editor.move_to(handle);
+        editor.press();
+        editor.move_by(6, 12);
+        editor.move_by(6, 12);
+        editor.release();
+        return editor.wait_for("another picture", [](const json& now) { return now["changed"].get<bool>() && shows_final(now, "cut.image"); })["text"].get<std::string>();
+    };
+    EXPECT_THAT(drag("plane:move"), HasSubstr("origin: [0.5, 0.5,"));
+    editor.key("z", "ctrl");
+    editor.wait_for("undo", [&](const json& now) { return now["text"] == text; });
+    EXPECT_THAT(drag("plane:turn"), HasSubstr("normal: ["));
+    keep(editor.screenshot(), "plane");
+    editor.key("F11");
+    const json s = editor.with("message");
+    EXPECT_THAT(s["message"].get<std::string>(), HasSubstr("picture-"));
+}
+
 // As somebody who has read nothing: every click, key and typed word counts.
 TEST_F(Window, aNewcomerComparesTwoCodecsOnTheEngineInFewActions) {
     VOXLOOM_NEEDS_DATA(data);

@@ -173,6 +173,8 @@ std::vector<Action> make_actions() {
          [](E& e) { edit(e, [&e] { reset_camera(e.work, e.registry, *shown_camera(e)); }); }, has_camera},
         {"screenshot", "Picture", "Screenshot", "Saves the window as a PNG file in the output folder.", GLFW_KEY_F12, false, false,
          [](E& e) { e.screenshot_wanted = true; }},
+        {"picture-file", "Picture", "Save picture", "Saves the shown picture, at its own size, as a PNG file in the output folder.", GLFW_KEY_F11, false, false,
+         [](E& e) { e.picture_wanted = true; }},
         {"expert", "View", "Expert", "Shows the parameters for experts, too.", GLFW_KEY_E, true, false,
          [](E& e) { e.show_expert = !e.show_expert; }},
         {"problems", "View", "Problems", "Lists everything that is wrong with the graph.", GLFW_KEY_P, false, false,

@@ -53,8 +53,9 @@ void draw_numbers(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo
 struct Plot {
     ImVec2 lo, hi;
     double t0 = 0, t1 = 1, p0 = 0, p1 = 1;  // log10 of seconds, decibels
+    double exact = 1;                       // where what is without error stands: a little above all others
 
-    static double finite(double psnr) { return std::clamp(psnr, -50.0, 200.0); }  // exact is infinite
+    double finite(double psnr) const { return std::min(psnr, exact); }
     ImVec2 place(const Tried& t) const {
         const double x = (std::log10(std::max(t.seconds, 1e-9)) - t0) / (t1 - t0), y = (finite(t.psnr) - p0) / (p1 - p0);
         return {lo.x + float(x) * (hi.x - lo.x), hi.y - float(y) * (hi.y - lo.y)};
@@ -64,10 +65,13 @@ struct Plot {
 Plot plot_of(const std::vector<Tried>& tried, ImVec2 lo, ImVec2 hi) {
     Plot plot{lo, hi};
     if (tried.empty()) return plot;
+    plot.exact = 0;
+    for (const Tried& t : tried)
+        if (std::isfinite(t.psnr)) plot.exact = std::max(plot.exact, t.psnr + 6);
     plot.t0 = plot.p0 = 1e300;
     plot.t1 = plot.p1 = -1e300;
     for (const Tried& t : tried) {
-        const double x = std::log10(std::max(t.seconds, 1e-9)), y = Plot::finite(t.psnr);
+        const double x = std::log10(std::max(t.seconds, 1e-9)), y = plot.finite(t.psnr);
         plot.t0 = std::min(plot.t0, x), plot.t1 = std::max(plot.t1, x);
         plot.p0 = std::min(plot.p0, y), plot.p1 = std::max(plot.p1, y);
     }

@@ -83,6 +83,7 @@ struct Viewport {
     Mode mode = Mode::single;
     std::array<Picture, 4> pictures;
     Difference difference;
+    enum class Handle { none, move, turn } held = Handle::none;  // of the cutting plane
     double wipe = 0.5;         // share of the width that shows the first picture
     double zoom = 0;           // screen pixels a picture pixel; 0: fitted
     glm::dvec2 offset{0.0};    // of the picture's middle from the viewport's, in screen pixels
@@ -147,7 +148,7 @@ struct Editor {
     std::string copied;
     float split_x = 0.6f, split_y = 0.5f;      // of the window: canvas | rest; picture above parameters
     bool quit = false;
-    bool theme_changed = false, screenshot_wanted = false;
+    bool theme_changed = false, screenshot_wanted = false, picture_wanted = false;
 
     std::string message;        // a sentence at the pointer, until message_until
     double message_until = 0;

@@ -16,18 +16,6 @@ namespace {
 #define GL_CLAMP_TO_EDGE 0x812F
 #endif
 
-// Opaque, over black where the picture is transparent. Not a number is black.
-std::vector<glm::u8vec4> pixels_of(const Image& image) {
-    std::vector<glm::u8vec4> pixels(std::size_t(image.size().x) * std::size_t(image.size().y));
-    if (image.format() == Image::Format::rgba8) {
-        std::ranges::copy(image.rgba8(), pixels.begin());
-        for (glm::u8vec4& p : pixels) p.a = 255;
-        return pixels;
-    }
-    std::ranges::transform(image.rgba32f(), pixels.begin(), screen_pixel);
-    return pixels;
-}
-
 void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
     if (!picture.texture) glGenTextures(1, &picture.texture);
     GLint before = 0;
@@ -50,6 +38,17 @@ const Image* image_in(const LiveValue* value) {
 }
 
 }  // namespace
+
+std::vector<glm::u8vec4> pixels_of(const Image& image) {
+    std::vector<glm::u8vec4> pixels(std::size_t(image.size().x) * std::size_t(image.size().y));
+    if (image.format() == Image::Format::rgba8) {
+        std::ranges::copy(image.rgba8(), pixels.begin());
+        for (glm::u8vec4& p : pixels) p.a = 255;
+        return pixels;
+    }
+    std::ranges::transform(image.rgba32f(), pixels.begin(), screen_pixel);
+    return pixels;
+}
 
 bool update_picture(Picture& picture, const LiveValue* value) {
     const Image* image = image_in(value);

@@ -17,6 +17,12 @@ void delete_textures(Editor& editor);
 SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports);
 inline ImTextureID texture_of(const Picture& picture) { return reinterpret_cast<ImTextureID>(std::uintptr_t(picture.texture)); }
 
+// The handles of the cutting plane that a picture (lo..hi of the screen) shows, where it shows one. True
+// while one is in the hand.
+bool draw_plane_gizmo(Editor& editor, const WireEnd& port, const Camera* camera, glm::dvec2 lo, glm::dvec2 hi, bool hovered);
+
+// Opaque, over black where the picture is transparent. Not a number is black.
+std::vector<glm::u8vec4> pixels_of(const Image& image);
 // "(3, 4)  0.1 0.2 0.3 1": what a pixel is, and where in the world what it shows. Empty outside.
 std::string pixel_text(const Image& image, glm::dvec2 at, const Camera* camera);
 

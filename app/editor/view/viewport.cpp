@@ -226,7 +226,7 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     const glm::dvec2 whole = glm::max(glm::dvec2(whole_size(editor, port, picture->size)), glm::dvec2(1));
     const double fitted = std::min(cell.size.x / whole.x, cell.size.y / whole.y);
     const glm::dvec2 middle = cell.lo + cell.size * 0.5;
-    handle_mouse(editor, middle, view.zoom > 0 ? view.zoom : fitted, whole.y);
+    if (view.held == Viewport::Handle::none) handle_mouse(editor, middle, view.zoom > 0 ? view.zoom : fitted, whole.y);
     const double scale = view.zoom > 0 ? view.zoom : fitted;
     const glm::dvec2 half = whole * scale * 0.5, lo = middle + view.offset - half, hi = middle + view.offset + half;
     ImDrawList& list = *ImGui::GetWindowDrawList();
@@ -238,12 +238,13 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
         list.AddImage(texture_of(view.pictures[b]), im({x, lo.y}), im(hi), {float(view.wipe), 0}, {1, 1});
         list.AddLine(im({x, lo.y}), im({x, hi.y}), theme().accent, std::max(ui(1), 1.f));
     }
+    const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, port.node));
+    draw_plane_gizmo(editor, port, camera, lo, hi, hovered);
     std::string text = view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
                                                      : caption(editor, port, *value, picture->size);
     if (hovered && view.mode != Mode::difference) {
         const Image& image = *std::get<ImagePtr>(value->value);
         const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image.size());
-        const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, port.node));
         if (std::string pixel = pixel_text(image, at, camera); !pixel.empty()) text += "   " + pixel;
     }
     draw_caption(cell.lo, cell.size, text, value->fresh);

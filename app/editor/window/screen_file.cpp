@@ -44,29 +44,33 @@ std::string screen_to_json(const Editor& editor) {
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-void save_screenshot(const std::filesystem::path& file, int width, int height) {
-    std::vector<unsigned char> pixels(std::size_t(width) * std::size_t(height) * 4);
-    glPixelStorei(GL_PACK_ALIGNMENT, 1);
-    glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, pixels.data());
-    for (std::size_t i = 3; i < pixels.size(); i += 4) pixels[i] = 255;
+void save_png(const std::filesystem::path& file, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
     png_image image;
     std::memset(&image, 0, sizeof image);
     image.version = PNG_IMAGE_VERSION;
-    image.width = png_uint_32(width);
-    image.height = png_uint_32(height);
+    image.width = png_uint_32(size.x);
+    image.height = png_uint_32(size.y);
     image.format = PNG_FORMAT_RGBA;
-    // OpenGL's rows go upwards.
-    const png_int_32 stride = -png_int_32(width) * 4;
     png_alloc_size_t bytes = 0;
     std::vector<std::byte> encoded;
-    bool fine = png_image_write_to_memory(&image, nullptr, &bytes, 0, pixels.data(), stride, nullptr);
+    bool fine = png_image_write_to_memory(&image, nullptr, &bytes, 0, pixels.data(), 0, nullptr);
     encoded.resize(fine ? bytes : 0);
-    fine = fine && png_image_write_to_memory(&image, encoded.data(), &bytes, 0, pixels.data(), stride, nullptr);
-    if (!fine) fail("{}: the screenshot cannot be encoded: {}", file.string(), image.message);
+    fine = fine && png_image_write_to_memory(&image, encoded.data(), &bytes, 0, pixels.data(), 0, nullptr);
+    if (!fine) fail("{}: the picture cannot be encoded: {}", file.string(), image.message);
     std::filesystem::create_directories(file.parent_path());
     OutputFile out(file);
     out.write(std::span(encoded).first(bytes));
     out.commit();
+}
+
+void save_screenshot(const std::filesystem::path& file, int width, int height) {
+    std::vector<glm::u8vec4> upwards(std::size_t(width) * std::size_t(height)), pixels;
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, upwards.data());
+    pixels.reserve(upwards.size());
+    for (int y = height; y-- > 0;)
+        for (int x = 0; x < width; ++x) pixels.emplace_back(glm::u8vec3(upwards[std::size_t(y) * std::size_t(width) + std::size_t(x)]), 255);
+    save_png(file, {width, height}, pixels);
 }
 
 }  // namespace voxloom::editor

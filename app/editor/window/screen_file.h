@@ -13,6 +13,8 @@ namespace voxloom::editor {
 // message, the selected nodes, the ports that are looked at, the states of all nodes, and how long frames and pictures took.
 std::string screen_to_json(const Editor& editor);
 
+// Rows go down. Throws Error.
+void save_png(const std::filesystem::path& file, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels);
 // The window's pixels as a PNG file. Called when a frame has been drawn. Throws Error.
 void save_screenshot(const std::filesystem::path& file, int width, int height);
 

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <ctime>
 #include <memory>
+#include <utility>
 
 #include "app/editor/view/picture.h"
 #include "app/editor/window/screen_file.h"
@@ -78,17 +79,32 @@ void set_theme(Editor& editor, float screen_scale) {
     save_settings(editor.settings, editor.settings_file);
 }
 
-void take_screenshot(Editor& editor, glm::ivec2 size) {
-    editor.screenshot_wanted = false;
+// "out/NAME-20261128-201500.png", a file that is not there yet.
+fs::path fresh_file(const Editor& editor, const std::string& name) {
     const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
     std::tm local{};
     localtime_r(&now, &local);
-    char name[64];
-    std::strftime(name, sizeof name, "screenshot-%Y%m%d-%H%M%S", &local);
-    fs::path file = editor.output_folder / fmt::format("{}.png", name);
-    for (int i = 2; fs::exists(file); ++i) file = editor.output_folder / fmt::format("{}-{}.png", name, i);
+    char time[64];
+    std::strftime(time, sizeof time, "%Y%m%d-%H%M%S", &local);
+    fs::path file = editor.output_folder / fmt::format("{}-{}.png", name, time);
+    for (int i = 2; fs::exists(file); ++i) file = editor.output_folder / fmt::format("{}-{}-{}.png", name, time, i);
+    return file;
+}
+
+// The shown picture as it was computed, not as it is magnified.
+void save_picture(const Editor& editor, const fs::path& file) {
+    for (const WireEnd& port : editor.watched)
+        if (auto value = editor.live.values.find(port.node + "." + port.port); value != editor.live.values.end())
+            if (const auto* image = std::get_if<ImagePtr>(&value->second.value)) return save_png(file, (*image)->size(), pixels_of(**image));
+    fail("there is no picture to save");
+}
+
+void take_wanted_pictures(Editor& editor, glm::ivec2 size) {
+    const bool picture = std::exchange(editor.picture_wanted, false);
+    if (!std::exchange(editor.screenshot_wanted, false) && !picture) return;
+    const fs::path file = fresh_file(editor, picture ? "picture" : "screenshot");
     try {
-        save_screenshot(file, size.x, size.y);
+        picture ? save_picture(editor, file) : save_screenshot(file, size.x, size.y);
         say(editor, "Saved " + fs::absolute(file).lexically_normal().string());
     } catch (const std::exception& e) {
         say(editor, e.what(), true);
@@ -137,7 +153,7 @@ void draw_frame(Editor& editor, GLFWwindow* window) {
     glClearColor(clear.x, clear.y, clear.z, 1);
     glClear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-    if (editor.screenshot_wanted) take_screenshot(editor, size);
+    take_wanted_pictures(editor, size);
     glfwSwapBuffers(window);
 }
 
