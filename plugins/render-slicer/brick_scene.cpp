@@ -39,20 +39,26 @@ ValueRange range_of_everything(const Bricks& bricks, const std::stop_token& stop
     return lo <= hi ? ValueRange{std::clamp(lo, least, most), std::clamp(hi, least, most)} : ValueRange{};
 }
 
+// Distances between slices that pages have: 1, 2, 4 ... planes.
+int steps_of(const BricksDesc& desc, const std::vector<Page>& pages) {
+    int steps = 1;
+    for (const Page& p : pages) steps = std::max(steps, 1 + int(std::log2(step_of(desc, p.brick.level))));
+    return steps;
+}
+
 // The atlas that has room for `wanted`; made anew where it is too small or its texels lack validity.
-std::shared_ptr<Atlas> atlas_for(const BricksPtr& bricks, const std::vector<BrickId>& wanted, ValueRange range,
-                                 const BrickRequest& request, bool validity) {
-    struct Holder {
-        std::shared_ptr<Atlas> atlas;
-    };
+std::shared_ptr<Atlas> atlas_for(const BrickPlan& plan, const BrickRequest& request, bool validity) {
+    const BricksPtr& bricks = plan.bricks;
+    const std::vector<BrickId>& wanted = plan.wanted;
+    const ValueRange range = plan.range;
     const BricksDesc& desc = bricks->desc();
     const auto need = std::int64_t(wanted.size());
     std::int64_t all = 0;
     int finest = int(desc.levels.size()) - 1;
     for (const LevelDesc& l : desc.levels) all += std::int64_t(l.bricks.x) * l.bricks.y * l.bricks.z;
     for (const BrickId& id : wanted) finest = std::min(finest, id.level);
-    // The rest is for tables and the like.
-    const std::uint64_t most_bytes = request.gpu_bytes / 4 * 3;
+    const std::uint64_t tables = request.table_bytes * std::uint64_t(steps_of(desc, plan.pages)) + table_bytes(desc, plan.grid);
+    const std::uint64_t most_bytes = request.gpu_bytes - std::min(request.gpu_bytes, std::max(tables, request.gpu_bytes / 8));
     validity = validity || desc.volume.has_mask;
     bool whole = true;
     for (;;) {
@@ -74,8 +80,9 @@ std::shared_ptr<Atlas> atlas_for(const BricksPtr& bricks, const std::vector<Bric
             const std::uint64_t each = Atlas::slot_bytes(desc, request.apron, texels.bytes());
             const auto most = std::int64_t(most_bytes / each);
             if (need > most)
-                fail("gpu_memory of {} holds {} bricks of {} each, but this picture needs {}; raise gpu_memory or select "
-                     "fewer bricks", human_bytes(double(request.gpu_bytes)), most, human_bytes(double(each)), need);
+                fail("gpu_memory of {} holds {} bricks of {} each beside {} of tables, but this picture needs {}; raise "
+                     "gpu_memory or select fewer bricks", human_bytes(double(request.gpu_bytes)), most,
+                     human_bytes(double(each)), human_bytes(double(tables)), need);
             // Room for the next pictures too, but no more than there are bricks.
             places = Places::in_slots(desc, request.apron, std::min({2 * need, most, all}));
             if (places->slots < need)
@@ -88,29 +95,30 @@ std::shared_ptr<Atlas> atlas_for(const BricksPtr& bricks, const std::vector<Bric
                              .hash(request.transfer ? hash_of(*request.transfer) : Hash{}).value(request.slab)
                              .value(whole ? places->first_level : -1).finish();
         auto make = [&](std::uint64_t& bytes) {
-            auto holder = std::make_shared<Holder>();
-            holder->atlas = std::make_shared<Atlas>(bricks, texels, apron, *places);
-            bytes += holder->atlas->bytes();
-            return holder;
+            const glm::u64vec3 n(places->dims);
+            Keep::instance().make_room(n.x * n.y * n.z * texels.bytes());
+            auto made = std::make_shared<Atlas>(bricks, texels, apron, *places);
+            bytes += made->bytes();
+            return made;
         };
-        std::shared_ptr<const Holder> holder;
+        std::shared_ptr<const Atlas> atlas;
         try {
-            holder = Keep::instance().get<Holder>(bricks, key, make);
-            if (!validity && holder->atlas->texels().layout.validity) {
+            atlas = Keep::instance().get<Atlas>(bricks, key, make);
+            if (!validity && atlas->texels().layout.validity) {
                 validity = true;  // known from an earlier picture
                 continue;
             }
-            if (holder->atlas->slots() < need || holder->atlas->texels().layout.validity != validity) {
+            if (atlas->slots() < need || atlas->texels().layout.validity != validity) {
                 Keep::instance().drop(bricks, key);
-                holder.reset();
-                holder = Keep::instance().get<Holder>(bricks, key, make);
+                atlas.reset();
+                atlas = Keep::instance().get<Atlas>(bricks, key, make);
             }
         } catch (const Error&) {
             if (!whole) throw;
             whole = false;  // the driver has no room for all of it
             continue;
         }
-        return holder->atlas;
+        return std::const_pointer_cast<Atlas>(atlas);
     }
 }
 
@@ -149,7 +157,8 @@ void load_atlas(BrickPlan& plan, const std::vector<BrickId>& wanted, const Brick
         ev.count("families decoded", double(BrickCache::global().counters().families_decoded - families));
         if (!c.found_invalid || plan.atlas->texels().layout.validity || plan.bricks->desc().volume.color) return;
         // Seen for the first time: all texels get a channel for it.
-        plan.atlas = atlas_for(plan.bricks, plan.wanted, plan.range, request, true);
+        plan.atlas.reset();
+        plan.atlas = atlas_for(plan, request, true);
     }
 }
 
@@ -158,12 +167,11 @@ void find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, cons
                     const BrickRequest& request, BrickScene& scene) {
     const double least = scene.range.min;
     // The finest page's blocks, coarser where there would be too many to leap between.
-    constexpr double kMostBlocks = 1 << 19;
     int finest = int(desc.levels.size()) - 1;
     for (const Page& p : pages) finest = std::min(finest, p.brick.level);
     glm::i64vec3 size = glm::i64vec3(atlas.block()) * glm::i64vec3(desc.levels[std::size_t(finest)].stride);
     glm::ivec3 grid = grid_over(desc.volume.dims, size);
-    while (double(grid.x) * double(grid.y) * double(grid.z) > kMostBlocks) {
+    while (double(grid.x) * double(grid.y) * double(grid.z) > double(kMostBlocks)) {
         size *= 2;
         grid = grid_over(desc.volume.dims, size);
     }
@@ -253,7 +261,8 @@ BrickPlan plan_bricks(const BricksPtr& bricks, const Selection* selection, const
     if (plan.pages.empty()) return plan;
     plan.wanted = bricks_of(plan.pages);
     ev.count("bricks drawn", double(plan.wanted.size()));
-    plan.atlas = atlas_for(bricks, plan.wanted, plan.range, request, false);
+    plan.grid = grid_of(bricks->desc(), plan.pages);
+    plan.atlas = atlas_for(plan, request, false);
     return plan;
 }
 
@@ -268,22 +277,27 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
     const std::shared_ptr<Atlas> atlas = plan.atlas;
     scene.atlas = atlas;
 
+    // The last picture's tables make room for this one's.
+    const Hash tables = Hasher().text("tables").finish();
+    Keep::instance().drop(bricks, tables);
+    Keep::instance().make_room(table_bytes(desc, plan.grid));
     find_occupancy(desc, pages, *atlas, request, scene);
     if (!what_is_there) ev.count("blocks", double(scene.blocks.x) * double(scene.blocks.y) * double(scene.blocks.z));
     if (!what_is_there) ev.count("blocks drawn", double(scene.seen));
     if (scene.seen == 0) return scene;
 
-    PageGrid grid = grid_of(desc, pages);
-    if (request.in_view && atlas->places().whole())
-        grid = merged(desc, grid, [&](BrickId id) {
+    PageGrid grid = what_is_there ? grid_of(desc, pages) : plan.grid;
+    if (request.in_view && atlas->places().whole()) {
+        PageGrid joined = merged(desc, grid, [&](BrickId id) {
             const ValueRange r = bricks->info(id).range;
             return !request.visible(scene.range.min, r.min, r.max) || !request.in_view(desc.fine_box_of(id));
         });
-    if (!what_is_there) ev.count("pages drawn", double(grid.pages.size()));
-    for (const Page& p : grid.pages) {
-        scene.blended = scene.blended || p.parent;
-        scene.steps = std::max(scene.steps, 1 + int(std::log2(step_of(desc, p.brick.level))));
+        // Boxes of small cells may be more than the large bricks that they are of.
+        if (joined.pages.size() <= grid.pages.size()) grid = std::move(joined);
     }
+    if (!what_is_there) ev.count("pages drawn", double(grid.pages.size()));
+    for (const Page& p : grid.pages) scene.blended = scene.blended || p.parent;
+    scene.steps = steps_of(desc, grid.pages);
     scene.cell_size = glm::vec3(grid.cell);
     scene.cells = grid.cells;
     scene.brick_size = glm::vec3(desc.brick);
@@ -313,6 +327,11 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
         field->voxels.textures.push_back({"page_index", page_index(grid)});
         field->voxels.textures.push_back({"page_table", page_table(desc, grid, *atlas)});
     }
+    Keep::instance().get<gpu::FieldSource>(bricks, tables, [&](std::uint64_t& bytes) {
+        bytes += scene.occupancy->bytes;
+        for (std::size_t i = 1; i < field->voxels.textures.size(); ++i) bytes += field->voxels.textures[i].texture->bytes;
+        return field;
+    });
     scene.field = field;
     return scene;
 }

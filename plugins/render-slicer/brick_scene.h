@@ -48,7 +48,8 @@ struct BrickRequest {
     std::function<bool(double least, double lo, double hi)> visible;
     // Whether rays may come to a box of voxels of level 0. Null: pages are not joined, each is a brick.
     std::function<bool(const Box&)> in_view;
-    std::uint64_t gpu_bytes = 0;     // that the atlas may take
+    std::uint64_t gpu_bytes = 0;     // that bricks and all tables may take at once ...
+    std::uint64_t table_bytes = 0;   // ... and, for each distance of slices, tables that are not made here
 };
 
 // What a picture draws of its bricks and where they go; nothing is decoded yet.
@@ -57,6 +58,7 @@ struct BrickPlan {
     ValueRange range;                // of every value that any brick can hold
     std::vector<Page> pages;         // empty: nothing can be seen
     std::vector<BrickId> wanted;
+    PageGrid grid;                   // of the pages, before any are joined
     std::shared_ptr<Atlas> atlas;
     std::vector<BrickId> missing() const;  // on the GPU
 };

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "core/data/brick_cache.h"
 #include "core/data/dense_pyramid.h"
@@ -213,10 +215,10 @@ static void expect_same_picture(const std::string& mode, int slots_memory, Index
     const VolumePtr volume = blob(dims);
     const BricksPtr bricks = pyramid(volume, brick);
     const Camera camera = looking({1, 0.6, 0.4}, volume->desc(), kPerspective);
-    const ImagePtr b = draw(volume, nullptr, smooth(240), camera, mode).image();
+    const ImagePtr b = draw(volume, nullptr, smooth(240), camera, mode + ", table_size: 64").image();
     EXPECT_GT(brightest(*b), 0.04) << mode;
     for (int memory : {2048, slots_memory}) {
-        NodeRun run = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, mode + ", gpu_memory: " + std::to_string(memory));
+        NodeRun run = draw(bricks, level_of(bricks->desc(), 0), smooth(240), camera, mode + ", table_size: 64, gpu_memory: " + std::to_string(memory));
         if (memory == 2048)
             EXPECT_EQ(run.counters["pages drawn"], 1) << mode;
         else
@@ -268,6 +270,24 @@ TEST(BrickPath, ALevelAloneIsDrawnAsAVolumeOfItsOwn) {
                 for (int x = 14; x < 34; ++x) sum += glm::distance(a->at(x, y), b->at(x, y)) / (16 * 20);
             EXPECT_LT(sum, 0.02) << level << mode;
         }
+    }
+}
+
+TEST(BrickPath, WhatIsNotSelectedIsNotDrawn) {
+    // Holes that could be seen: every other brick, at the finest level.
+    const VolumePtr volume = make_volume({64, 64, 64}, ScalarType::u8, [](auto, auto, auto) { return 100.0; });
+    const BricksPtr bricks = pyramid(volume, 16);
+    auto half = level_of(bricks->desc(), 0), lower = level_of(bricks->desc(), 0);
+    std::erase_if(half->bricks, [](const SelectedBrick& b) { return (b.id.index.x + b.id.index.y + b.id.index.z) % 2; });
+    std::erase_if(lower->bricks, [](const SelectedBrick& b) { return b.id.index.z >= 2; });
+    Camera camera = looking({0, 0, 1}, volume->desc(), kOrthographic);
+    camera.up = {0, 1, 0};
+    for (const char* mode : {"", ", skipping: false", ", compositing: x-ray", ", classification: post"}) {
+        // Whichever way through the bricks, half of its 63 voxels, 32 or 31, are medium.
+        const ImagePtr image = draw(bricks, half, constant_medium(0.02), camera, mode).image();
+        EXPECT_NEAR(image->at(20, 20).a, 1 - std::exp(-0.02 * 31.5), 0.02 * 0.6) << mode;
+        EXPECT_NEAR(image->at(28, 22).a, 1 - std::exp(-0.02 * 31.5), 0.02 * 0.6) << mode;
+        EXPECT_NEAR(draw(bricks, lower, constant_medium(0.02), camera, mode).image()->at(25, 18).a, 1 - std::exp(-0.02 * 32), 1e-4) << mode;
     }
 }
 
@@ -395,6 +415,36 @@ TEST(BrickPath, BricksComeAndGoWithoutATrace) {
     NodeRun back = draw(bricks, half(false), smooth(240), camera, ", gpu_memory: 4");
     EXPECT_GT(back.counters["bricks evicted"], 0);
     EXPECT_LT(largest_difference(*a, *back.image()), 1e-5);  // other slots round otherwise
+}
+
+TEST(BrickPath, TheLimitHoldsWhateverIsLookedAt) {
+    // A camera that jumps: other bricks, other levels, other textures beside the values' own.
+    const BricksPtr bricks = pyramid(blob({128, 128, 128}), 16);
+    const BricksDesc& desc = bricks->desc();
+    std::mt19937 random(7);
+    std::size_t evicted = 0;
+    for (int jump = 0; jump < 40; ++jump) {
+        const int level = int(random() % 3), memory = 2 + int(random() % 3);
+        auto s = level_of(desc, level);
+        std::shuffle(s->bricks.begin(), s->bricks.end(), random);
+        s->bricks.resize(std::min<std::size_t>(s->bricks.size(), 20));
+        if (level == 2) s = nested(desc, int(random() % 8));
+        const char* modes[] = {"", ", shading: true", ", classification: post", ", compositing: mip"};
+        NodeRun run = draw(bricks, s, smooth(240), looking(kViews[random() % 6], desc.volume, kPerspective),
+                           std::string(modes[random() % 4]) + ", table_size: 64, gpu_memory: " + std::to_string(memory));
+        EXPECT_GT(run.measured("GPU memory"), 0);
+        EXPECT_LE(run.measured("GPU memory"), double(memory << 20)) << jump;
+        evicted += std::size_t(run.counters["bricks evicted"]);
+    }
+    EXPECT_GT(evicted, 0u);
+    // Nothing can be drawn without room for the tables and one brick.
+    for (int memory : {0, 1})
+        try {
+            draw(bricks, level_of(desc, 0), smooth(240), looking({1, 1, 1}, desc.volume, kPerspective), ", gpu_memory: " + std::to_string(memory));
+            FAIL() << memory;
+        } catch (const Error& e) {
+            EXPECT_THAT(e.what(), ::testing::HasSubstr("raise gpu_memory"));
+        }
 }
 
 TEST(BrickPath, VoxelsThatAreNotNumbersAreTransparent) {

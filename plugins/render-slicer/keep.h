@@ -5,6 +5,7 @@
 // thread alone, where textures may die at once.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <list>
 #include <memory>
@@ -32,8 +33,34 @@ class Keep {
         std::uint64_t bytes = 0;
         std::shared_ptr<const T> thing = make(bytes);
         entries_.push_front({owner, key, thing, bytes});
+        peak_ = std::max(peak_, held());
         return thing;
     }
+
+    // A picture begins: make_room() keeps this limit, and peak() is of the picture.
+    void begin(std::uint64_t byte_limit) {
+        limit_ = byte_limit;
+        shrink(limit_);
+        peak_ = held();
+    }
+    // Drops what nobody holds, least recently used first, until so much more is within the limit; false
+    // where it cannot be.
+    bool make_room(std::uint64_t bytes) {
+        std::uint64_t now = held();
+        for (auto it = entries_.end(); it != entries_.begin() && now + bytes > limit_;) {
+            --it;
+            if (it->thing.use_count() > 1 || it->bytes == 0) continue;
+            now -= it->bytes;
+            it = entries_.erase(it);
+        }
+        return now + bytes <= limit_;
+    }
+    std::uint64_t held() const {
+        std::uint64_t sum = 0;
+        for (const Entry& e : entries_) sum += e.bytes;
+        return sum;
+    }
+    std::uint64_t peak() const { return peak_; }  // bytes, since begin()
 
     // Forgets one thing; it dies when nobody holds it any more.
     void drop(const std::shared_ptr<const void>& owner, const Hash& key) {
@@ -43,10 +70,9 @@ class Keep {
     // Drops what is over the limit or has lost its owner.
     void shrink(std::uint64_t byte_limit) {
         entries_.remove_if([](const Entry& e) { return e.owner.expired(); });
-        std::uint64_t held = 0;
-        for (const Entry& e : entries_) held += e.bytes;
-        while (held > byte_limit && !entries_.empty()) {
-            held -= entries_.back().bytes;
+        std::uint64_t now = held();
+        while (now > byte_limit && !entries_.empty()) {
+            now -= entries_.back().bytes;
             entries_.pop_back();
         }
     }
@@ -62,6 +88,7 @@ class Keep {
         return !a.owner_before(b) && !b.owner_before(a);
     }
     std::list<Entry> entries_;
+    std::uint64_t limit_ = ~std::uint64_t(0), peak_ = 0;
 };
 
 }  // namespace voxloom::slicer

@@ -152,11 +152,26 @@ int step_of(const BricksDesc& desc, int level) {
     return ratio >= 2 ? 1 << std::min(int(std::log2(ratio * (1 + 1e-9))), 12) : 1;
 }
 
+namespace {
+
+constexpr int kTexels = 12, kColumn = 4096;
+glm::ivec3 table_dims(std::size_t pages) {
+    return {kTexels * int((pages + kColumn - 1) / kColumn), std::min<std::size_t>(pages, kColumn), 1};
+}
+
+}  // namespace
+
+std::uint64_t table_bytes(const BricksDesc& bricks, const PageGrid& grid) {
+    const glm::ivec3 dims = table_dims(grid.pages.size());
+    std::uint64_t blocks = grid.page.size();  // as Atlas::block() cuts bricks
+    for (int a = 0; a < 3; ++a) blocks *= std::uint64_t(bricks.brick[a] % 8 == 0 ? bricks.brick[a] / 8 : 1);
+    return std::uint64_t(dims.x) * std::uint64_t(dims.y) * sizeof(glm::vec4) + grid.page.size() * sizeof(float) +
+           std::min(blocks, std::uint64_t(kMostBlocks));
+}
+
 gpu::TexturePtr page_table(const BricksDesc& desc, const PageGrid& grid, const Atlas& atlas) {
-    constexpr int kTexels = 12, kColumn = 4096;
     const std::vector<Page>& pages = grid.pages;
-    const int columns = int((pages.size() + kColumn - 1) / kColumn);
-    const glm::ivec3 dims(kTexels * columns, std::min<std::size_t>(pages.size(), kColumn), 1);
+    const glm::ivec3 dims = table_dims(pages.size());
     std::vector<glm::vec4> texels(std::size_t(dims.x) * std::size_t(dims.y), glm::vec4(0.0f));
     for (std::size_t i = 0; i < pages.size(); ++i) {
         const Page& p = pages[i];

@@ -50,6 +50,10 @@ int step_of(const BricksDesc& bricks, int level);
 gpu::TexturePtr page_table(const BricksDesc& bricks, const PageGrid& grid, const Atlas& atlas);
 gpu::TexturePtr page_index(const PageGrid& grid);
 
+inline constexpr std::int64_t kMostBlocks = 1 << 19;  // to leap between
+// Bytes that the tables of pages and cells take at most, with the blocks to leap between.
+std::uint64_t table_bytes(const BricksDesc& bricks, const PageGrid& grid);
+
 // Calls f(linear index) for the cells of `size` that a box of voxels of level 0 meets.
 template <class F>
 void for_each_cell(const Box& box, glm::i64vec3 size, glm::ivec3 grid, const F& f) {

@@ -182,6 +182,7 @@ std::shared_ptr<Image> draw_bricks(const BricksPtr& bricks, const Selection& sel
     BrickRequest request;
     request.component = cut.component;
     request.gpu_bytes = cut.gpu_bytes;
+    request.table_bytes = kBins * sizeof(glm::vec4);
     request.visible = [](double, double, double) { return true; };
     BrickPlan plan;
     if (desc.voxels() > 0) plan = plan_bricks(bricks, &selection, request, ev);
@@ -240,7 +241,9 @@ void evaluate(Evaluation& ev) {
             selection = finest_on(bricks->desc(), plane);
         }
     }
+    Keep::instance().begin(cut.gpu_bytes);
     const ImagePtr image = draw_bricks(bricks, *selection, cut, ev);
+    ev.measure("GPU memory", double(Keep::instance().peak()), "bytes");
     Keep::instance().shrink(cut.gpu_bytes);
     ev.output("image", image);
 }
@@ -285,7 +288,7 @@ NodeType plane_node() {
             .in_group("sampling"),
         param::real("borders", 0, "Width of the lines around bricks; 0: none.")
             .range(0, 64).slider(0, 4).in_unit("pixels").in_group("picture"),
-        param::integer("gpu_memory", 2048, "Textures kept between two pictures; three quarters of it may be bricks.")
+        param::integer("gpu_memory", 2048, "Textures kept between two pictures; of bricks, all that there is of them and their tables at any time.")
             .range(0, 1 << 20).in_unit("MiB").in_group("speed").for_experts().changes(Affects::cost),
         first_picture_param(),
         param::real("bandwidth", 0, "Compressed bricks decoded a second while somebody looks on, so that other readers of a "

@@ -119,6 +119,7 @@ TexturePtr keep_table(const TransferPtr& transfer, const Hash& k, Evaluation& ev
         const std::int64_t start = wall_ns();
         const auto table = build();
         const bool single = std::is_same_v<decltype(table), const std::vector<float>>;
+        Keep::instance().make_room(table.size() * sizeof(table[0]));
         auto t = std::make_shared<gpu::Texture>(
             gpu::make_texture(target, single ? GL_R32F : GL_RGBA32F, {dims, 1}, GL_LINEAR, "the table of the transfer function"));
         gpu::upload(*t, {0, 0, 0}, {dims, 1}, single ? GL_RED : GL_RGBA, GL_FLOAT, table.data());
@@ -234,6 +235,12 @@ BrickJob plan_bricks(const Scene& scene, const View& view, Evaluation& ev) {
         return is_visible(scene, least, lo, hi);
     };
     request.in_view = [&view](const Box& box) { return view.may_meet(box); };
+    const TransferFunction2D* two = scene.transfer->two.get();
+    const std::uint64_t texels = two ? std::uint64_t(two->dims.x) * std::uint64_t(two->dims.y)
+                                 : s.classification == S::Classification::pre_integrated && is_slabs(s)
+                                     ? std::uint64_t(s.table_size) * std::uint64_t(s.table_size) + kIntegralNodes
+                                     : kEmissionBins;
+    request.table_bytes = texels * sizeof(glm::vec4);
     job.plan = slicer::plan_bricks(std::get<BricksPtr>(scene.source), scene.selection.get(), request, ev);
     return job;
 }
@@ -712,6 +719,7 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
     const VolumeDesc desc = std::holds_alternative<VolumePtr>(scene.source)
                                 ? std::get<VolumePtr>(scene.source)->desc()
                                 : std::get<BricksPtr>(scene.source)->desc().volume;
+    Keep::instance().begin(s.gpu_bytes);
     std::shared_ptr<const void> owner;
     if (auto* v = std::get_if<VolumePtr>(&scene.source))
         owner = *v;
@@ -760,6 +768,7 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
     draw(*program, target, view, background(s), ev);
     std::shared_ptr<Image> image = read_back(target);
     count_samples(target, ev);
+    ev.measure("GPU memory", double(Keep::instance().peak()), "bytes");
     Keep::instance().shrink(s.gpu_bytes);
     return image;
 }

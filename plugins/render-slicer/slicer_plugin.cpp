@@ -140,7 +140,7 @@ NodeType render_node() {
                        "the picture is the same.").in_group("speed").for_experts(),
         param::integer("block_size", 8, "Cells on each side of a block for skipping.")
             .range(2, 128).slider(4, 32).in_group("speed").for_experts(),
-        param::integer("gpu_memory", 2048, "Textures kept between two pictures; three quarters of it may be bricks.")
+        param::integer("gpu_memory", 2048, "Textures kept between two pictures; of bricks, all that there is of them and their tables at any time.")
             .range(0, 1 << 20).in_unit("MiB").in_group("speed").for_experts().changes(Affects::cost),
     };
     t.params.push_back(first_picture_param());
@@ -156,7 +156,7 @@ that the transfer function leaves transparent are leapt over (a chessboard dista
 and a ray ends where it is saturated.
 
 Of bricks with a selection only what is selected is decoded and uploaded, and stays from picture to picture.
-Where three quarters of `gpu_memory` have room for whole levels, bricks lie in one texture as they do in space,
+Where `gpu_memory` has room for whole levels, bricks lie in one texture as they do in space,
 and what is drawn of one level alone is drawn as a volume is. Else they lie in slots, least recently used out
 first, and `gpu_memory` must hold the bricks of one picture. Between levels a ray goes from brick to brick, with
 the slices and the table of each one's level; slabs are cut at the faces, so what a ray meets does not depend on

@@ -34,7 +34,7 @@ void march_bricks(float k, float end) {
         slab_length = length_of_slab / page_step;  // the tables are of slabs as thick as the page's
 #endif
         float from = floor(m / page_step) * page_step;
-        march(from, there ? next : from);
+        if (there) march(from, next);
         m = next;
         drawn_to = next;
     } while (m < leave && !finished());
