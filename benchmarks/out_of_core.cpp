@@ -83,11 +83,12 @@ void run(int argc, char** argv) {
             volume->read(box, slab.bytes().first(box.voxels() * desc.voxel_bytes()));
         }
     });
-    BricksPtr bricks;
+    testing::NodeRun encoded;
     timed("compressed", bytes, [&] {
         const std::string limit = memory > 0 ? ", memory: " + shortest(memory) : "";
-        bricks = testing::run_node(registry, codec, "{" + set + limit + "}", {{"volume", {Value(volume)}}}).output<Bricks>("bricks");
+        encoded = testing::run_node(registry, codec, "{" + set + limit + "}", {{"volume", {Value(volume)}}});
     });
+    const BricksPtr bricks = encoded.output<Bricks>("bricks");
     if (!out.empty())
         timed("written to the file", bytes, [&] {
             testing::run_node(registry, codec.substr(0, codec.find('.')) + ".write", "{path: '" + out + "'}",
@@ -95,6 +96,8 @@ void run(int argc, char** argv) {
         });
     fmt::print("{{{}}}: {}, {:.4f} bits a voxel\n", set, human_bytes(double(bricks->desc().compressed_bytes)),
                8 * double(bricks->desc().compressed_bytes) / double(desc.voxels()));
+    for (const auto& [name, value] : encoded.measurements) fmt::print("  {}: {:.6g} {}\n", name, value.first, value.second);
+    for (const auto& [name, count] : encoded.counters) fmt::print("  {}: {:.0f}\n", name, count);
 }
 
 }  // namespace

@@ -12,7 +12,6 @@ namespace voxloom::wavelet {
 
 namespace {
 
-constexpr std::int64_t kCounted = 2048;  // families of a level
 constexpr ValueRange kNothing{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
 
 // Of small integers; others need their range before they are mapped.
@@ -35,11 +34,25 @@ ValueRange range_of(const VoxelView& voxels, const Box& box, ScalarType type, in
     return range;
 }
 
-// Transforms the planes of a family; what is left of them is the low band.
-void to_low_band(const TreeDesc& tree, FamilyId family, FamilyCodec::Planes& planes, CoefficientCounts::Bands* counts) {
+double mean_detail(std::vector<std::int32_t>& box, const Shape& shape) {
+    Details d;
+    d.shape = shape;
+    d.q = box.data();
+    double sum = 0;
+    for_each_row(d, [&](const std::int32_t* q, std::size_t n) {
+        std::uint64_t row = 0;
+        for (std::size_t x = 0; x < n; ++x) row += q[x] < 0 ? 0u - std::uint32_t(q[x]) : std::uint32_t(q[x]);
+        sum += double(row);
+    });
+    return sum / double(shape.voxels());
+}
+
+// Transforms the planes of a family; what is left of them is the low band. Returns the mean size of the details.
+double to_low_band(const TreeDesc& tree, FamilyId family, FamilyCodec::Planes& planes, CoefficientCounts::Bands* counts) {
     thread_local std::vector<std::int32_t> scratch;
     const Shape shape = shape_of(tree, family);
     const glm::ivec3 n = shape.low();
+    double activity = 0;
     for (auto& plane : planes) {
         if (counts) {
             split_family(plane.data(), shape, tree.rounding, scratch);
@@ -47,12 +60,14 @@ void to_low_band(const TreeDesc& tree, FamilyId family, FamilyCodec::Planes& pla
         } else {
             forward(plane.data(), shape.dims, shape.halved, tree.rounding, scratch, shape.shared);
         }
+        activity += mean_detail(plane, shape);
         std::size_t to = 0;
         for (int z = 0; z < n.z; ++z)
             for (int y = 0; y < n.y; ++y, to += std::size_t(n.x))
                 std::copy_n(plane.begin() + std::ptrdiff_t(shape.at({0, y, z})), n.x, plane.begin() + std::ptrdiff_t(to));
         plane.resize(to);
     }
+    return activity;
 }
 
 }  // namespace
@@ -88,18 +103,20 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
     for (int l = 0; l < std::max(top, 1); ++l) {
         const Progress here = progress.part(l == 0 ? 0 : 1 - 0.15 / l, 1 - 0.15 / (l + 1));
         const std::uint64_t most = l == 0 ? e.memory.tile_voxels : e.memory.coarse_tile_voxels;
-        const Selection counted = select(tree, l, kCounted);
+        const Selection counted = select(tree, l, kCountedFamilies);
         const auto one = [&](std::int64_t i, const VoxelView& voxels) {
             const FamilyId family = family_at(tree, l, i);
             if (l == 0) {
-                e.sample.keep(tree, i, voxels);
                 if (!range_known) {
                     const ValueRange mine = range_of(voxels, own_box(tree, family), e.type(), components);
                     const std::lock_guard lock(mutex);
                     range = {std::min(range.min, mine.min), std::max(range.max, mine.max)};
                 }
             }
-            if (l == top) return;  // the root is not transformed here
+            if (l == top) {  // the root is not transformed here
+                if (l == 0) e.sample.keep(tree, i, voxels, 0);
+                return;
+            }
             thread_local FamilyCodec::Planes planes;
             const std::int64_t start = thread_cpu_ns();
             if (l == 0)
@@ -107,8 +124,9 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
             else
                 planes = e.originals(family);
             const auto bands = counts && counted.has(i) ? std::make_unique<CoefficientCounts::Bands>() : nullptr;
-            to_low_band(tree, family, planes, bands.get());
+            const double activity = to_low_band(tree, family, planes, bands.get());
             transform_ns += thread_cpu_ns() - start;
+            if (l == 0) e.sample.keep(tree, i, voxels, activity);
             if (masked) {
                 const Mask low = low_mask(l == 0 ? mask_of(voxels, box_of(tree, family)) : e.mask(family), shape_of(tree, family));
                 planes.emplace_back(low.begin(), low.end());
@@ -129,6 +147,7 @@ void analyse(Encoding& e, bool counts, const Progress& progress) {
             at = tile.last;
         }
     }
+    e.sample.finish();
     e.transform_seconds = double(transform_ns) * 1e-9;
     if (!range_known) e.tree.bricks.volume.range = range;
     progress(1);

@@ -27,6 +27,9 @@ struct Encoding {
     Mask mask(FamilyId family) const;
 };
 
+// Families of a level whose details are counted, at most.
+inline constexpr std::int64_t kCountedFamilies = 2048;
+
 // Reads the volume once. Fills the levels by tree.map and, where the volume's range is not known, the range.
 void analyse(Encoding& e, bool counts, const Progress& progress);
 

@@ -49,11 +49,11 @@ void CoefficientCounts::Bands::add(const Shape& shape, const std::int32_t* box) 
     }
 }
 
-void CoefficientCounts::add(int level, const Bands& bands) {
+void CoefficientCounts::add(int level, const Bands& bands, double weight) {
     Level& to = levels_[std::size_t(level)];
     for (std::size_t m = 0; m < to.count.size(); ++m)
-        for (std::size_t b = 0; b < to.count[m].size(); ++b) to.count[m][b] += bands.count[m][b];
-    to.voxels += bands.voxels;
+        for (std::size_t b = 0; b < to.count[m].size(); ++b) to.count[m][b] += weight * bands.count[m][b];
+    to.voxels += weight * double(bands.voxels);
 }
 
 bool CoefficientCounts::empty() const {
@@ -73,7 +73,7 @@ double CoefficientCounts::sum(const TreeDesc& tree, const OfBand& of_band) const
                                  band_norm(mask, tree.bricks.levels[l].stride,
                                            glm::bvec3(glm::ivec3(shape.halved) | glm::ivec3(shape.split))));
         const double voxels = double(Box::of(tree.bricks.levels[l].dims).voxels()) * tree.bricks.volume.components;
-        all += level * voxels / double(levels_[l].voxels);
+        all += level * voxels / levels_[l].voxels;
     }
     return all / double(tree.bricks.volume.voxels());
 }
@@ -88,7 +88,7 @@ double CoefficientCounts::squares(const TreeDesc& tree) const {
             if (counts[std::size_t(b)] > 0)
                 each_size(b, [&](double size, double weight) {
                     const double n = number_of(size, step), value = n == 0 ? 0 : (n + (n == 1 ? q.centre_one : q.centre_more)) * step;
-                    squares += weight * double(counts[std::size_t(b)]) * (size - value) * (size - value);
+                    squares += weight * counts[std::size_t(b)] * (size - value) * (size - value);
                 });
         return squares * norm * norm;
     });
@@ -102,7 +102,7 @@ double CoefficientCounts::bits(const TreeDesc& tree) const {
         for (int b = 0; b < kBins; ++b)
             if (counts[std::size_t(b)] > 0)
                 each_size(b, [&](double size, double weight) {
-                    const double n = std::min(number_of(size, step), 2147483647.0), some = weight * double(counts[std::size_t(b)]);
+                    const double n = std::min(number_of(size, step), 2147483647.0), some = weight * counts[std::size_t(b)];
                     const int token = token_of(std::uint32_t(n));
                     tokens[std::size_t(token)] += some;
                     all += some;

@@ -23,7 +23,8 @@ class CoefficientCounts {
 
     CoefficientCounts() = default;
     explicit CoefficientCounts(const TreeDesc& tree) : levels_(std::size_t(tree.top())) {}
-    void add(int level, const Bands& bands);
+    // A family stands for `weight` of them.
+    void add(int level, const Bands& bands, double weight = 1);
     bool empty() const;
 
     // Means over the voxels of level 0, under tree.quantiser.
@@ -32,8 +33,8 @@ class CoefficientCounts {
 
   private:
     struct Level {
-        std::array<std::array<std::uint64_t, kBins>, 8> count{};
-        std::uint64_t voxels = 0;
+        std::array<std::array<double, kBins>, 8> count{};
+        double voxels = 0;
     };
     template <class OfBand>
     double sum(const TreeDesc& tree, const OfBand& of_band) const;

@@ -80,20 +80,27 @@ class Emission {
         index_.coder = make_coder(e_.options.coder);
         const FamilyCodec codec(tree_, *index_.coder);
         const std::int64_t most = std::min(families_to_learn_from(index_.coder->kind()), sample_size(tree_));
-        Buffer buffer;
-        for (int l = tree_.top() - 1; l >= 0 && most > 0; --l) {
-            const Selection some = l == 0 ? e_.sample.selection() : select(tree_, l, most);
-            const std::int64_t step = std::max<std::int64_t>(1, some.count / most);
-            for (std::int64_t i = step / 2; i < some.count; i += step) {
-                check_stop(e_.stop);
+        const auto train_on = [&](FamilyId family, FamilyCodec::Planes& planes) {
+            check_stop(e_.stop);
+            codec.restore(family, parent_of(family), planes, [&](const Details& d) { index_.coder->train(d); }, FamilyCodec::After::spoiled);
+        };
+        FamilyCodec::Planes planes;
+        for (int l = tree_.top() - 1; l > 0 && most > 0; --l) {
+            const Selection some = select(tree_, l, most);
+            for (std::int64_t i = 0; i < some.count; ++i) {
                 const FamilyId family = family_at(tree_, l, some.family(i));
-                FamilyCodec::Planes planes;
-                if (l == 0)
-                    integers_of(tree_, e_.sample.get(tree_, i, buffer), family, planes);
-                else
-                    planes = e_.originals(family);
-                codec.restore(family, parent_of(family), planes, [&](const Details& d) { index_.coder->train(d); },
-                              FamilyCodec::After::spoiled);
+                planes = e_.originals(family);
+                train_on(family, planes);
+            }
+        }
+        if (tree_.top() > 0 && most > 0) {
+            Buffer buffer;
+            const auto some = e_.sample.families();
+            const std::size_t step = std::max<std::size_t>(1, some.size() / std::size_t(most));
+            for (std::size_t i = step / 2; i < some.size(); i += step) {
+                const FamilyId family = family_at(tree_, 0, some[i].family);
+                integers_of(tree_, e_.sample.get(tree_, some[i], buffer), family, planes);
+                train_on(family, planes);
             }
         }
         index_.coder->finish_training();

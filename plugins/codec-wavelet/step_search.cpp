@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/base/parallel.h"
 #include "plugins/codec-wavelet/emission.h"
@@ -10,9 +11,21 @@ namespace voxloom::wavelet {
 
 namespace {
 
-// A tenth of what there is, within limits: enough for a ratio, which is what is asked of them.
-std::int64_t families_to_try(const TreeDesc& tree) {
-    return std::min(std::clamp<std::int64_t>(family_count(tree, 0) / 10, 32, 96), sample_size(tree));
+// A tenth of what there is, within limits: enough for a ratio, which is what is asked of small volumes.
+std::size_t families_to_try(const TreeDesc& tree) {
+    return std::size_t(std::min(std::clamp<std::int64_t>(family_count(tree, 0) / 10, 32, 192), sample_size(tree)));
+}
+
+// Of each class of the sample as many as it has families, the more active counting more (Neyman's allocation, damped,
+// since coarse steps make all errors alike).
+std::array<std::size_t, Sample::kClasses> allot(const std::array<Sample::Class, Sample::kClasses>& classes, std::size_t families) {
+    std::array<double, Sample::kClasses> share{};
+    double all = 0;
+    for (std::size_t c = 0; c < share.size(); ++c) all += share[c] = double(classes[c].seen) * std::exp2(double(c) / 2);
+    std::array<std::size_t, Sample::kClasses> count{};
+    for (std::size_t c = 0; c < share.size(); ++c)
+        count[c] = std::min(classes[c].kept.size(), std::max<std::size_t>(3, std::size_t(double(families) * share[c] / all)));
+    return count;
 }
 
 constexpr double kLeast = 1e-300;
@@ -21,24 +34,29 @@ constexpr double kLeast = 1e-300;
 
 StepSearch::StepSearch(Encoding& e, int& rounds) : e_(e), rounds_(rounds), counts_(e.tree) {
     const TreeDesc& tree = e.tree;
-    const Selection& sample = e.sample.selection();
     families_.resize(std::size_t(tree.top()) + 1);
-    const std::int64_t step = std::max<std::int64_t>(1, sample.count / families_to_try(tree));
-    for (std::int64_t i = (step - 1) / 2; i < sample.count; i += step) families_[0].push_back(sample.family(i));
+    const auto& classes = e.sample.classes();
+    const auto count = allot(classes, families_to_try(tree));
+    for (std::size_t c = 0; c < classes.size(); ++c)
+        for (std::size_t i = 0; i < count[c]; ++i)
+            families_[0].push_back({classes[c].kept[i].family, double(classes[c].seen) / double(count[c]), classes[c].kept[i]});
+    const auto by_number = [](const Tried& a, const Tried& b) { return a.family < b.family; };
+    std::sort(families_[0].begin(), families_[0].end(), by_number);
+    // An ancestor stands for its share of those below it.
     for (int l = 0; l < tree.top(); ++l) {
-        auto& above = families_[std::size_t(l) + 1];
+        const double share = double(family_count(tree, l + 1)) / double(family_count(tree, l));
+        std::map<std::int64_t, double> above;
         const glm::i64vec3 n(families_of(tree, l + 1));
-        for (const std::int64_t i : families_[std::size_t(l)]) {
-            const glm::i64vec3 parent(family_of(tree, {l + 1, family_at(tree, l, i).index}).index);
-            above.push_back((parent.z * n.y + parent.y) * n.x + parent.x);
+        for (const Tried& one : families_[std::size_t(l)]) {
+            const glm::i64vec3 parent(family_of(tree, {l + 1, family_at(tree, l, one.family).index}).index);
+            above[(parent.z * n.y + parent.y) * n.x + parent.x] += one.weight * share;
         }
-        std::sort(above.begin(), above.end());
-        above.erase(std::unique(above.begin(), above.end()), above.end());
+        for (const auto& [family, weight] : above) families_[std::size_t(l) + 1].push_back({family, weight, {}});
     }
     const NoCoder none;
     set_step(0);
     std::vector<std::int32_t> scratch;
-    sweep(FamilyCodec(tree, none), Order::given, [&](FamilyId family, std::size_t, const FamilyCodec::Planes&, FamilyCodec::Planes& planes, const VoxelView& voxels) {
+    sweep(FamilyCodec(tree, none), Order::given, [&](FamilyId family, std::size_t k, const FamilyCodec::Planes&, FamilyCodec::Planes& planes, const VoxelView& voxels) {
         if (family.level == tree.top()) return;
         if (family.level == 0) integers_of(tree, voxels, family, planes);
         const Shape shape = shape_of(tree, family);
@@ -47,7 +65,7 @@ StepSearch::StepSearch(Encoding& e, int& rounds) : e_(e), rounds_(rounds), count
             split_family(plane.data(), shape, tree.rounding, scratch);
             bands.add(shape, plane.data());
         }
-        counts_.add(family.level, bands);
+        counts_.add(family.level, bands, families_[std::size_t(family.level)][k].weight);
     });
 }
 
@@ -71,14 +89,14 @@ void StepSearch::sweep(const FamilyCodec& codec, Order order, const Use& use) {
         here.assign(families.size(), {});
         const auto one = [&](std::size_t k) {
             check_stop(e_.stop);
-            const FamilyId family = family_at(tree, l, families[k]);
+            const FamilyId family = family_at(tree, l, families[k].family);
             FamilyCodec::Planes low;
             if (l < tree.top()) {
                 const Box parent = parent_box(tree, family);
                 const FamilyId owner = family_of(tree, {l + 1, family.index});
                 const auto& up = families_[std::size_t(l) + 1];
                 std::size_t at = 0;
-                while (family_at(tree, l + 1, up[at]).index != owner.index) ++at;
+                while (family_at(tree, l + 1, up[at].family).index != owner.index) ++at;
                 for (const auto& plane : above[at]) {
                     low.emplace_back(parent.voxels());
                     copy_box(parent, reinterpret_cast<const std::byte*>(plane.data()), box_of(tree, owner),
@@ -88,7 +106,7 @@ void StepSearch::sweep(const FamilyCodec& codec, Order order, const Use& use) {
             thread_local FamilyCodec::Planes planes;
             if (l == 0) {
                 Buffer buffer;
-                const VoxelView voxels = e_.sample.get(tree, e_.sample.selection().slot(families[k]), buffer);
+                const VoxelView voxels = e_.sample.get(tree, families[k].kept, buffer);
                 return use(family, k, low, planes, voxels);
             }
             planes = e_.originals(family);
@@ -149,19 +167,20 @@ Estimate StepSearch::estimate(bool with_bytes) {
             part.bytes = encoded.bytes.size();
         }
     });
-    double squares = 0, bytes = with_bytes ? double(coder->tables().size()) : 0;
-    std::uint64_t finite = 0;
-    for (int l = tree.top(); l >= 0; --l)
-        for (const Part& part : parts[std::size_t(l)]) {
-            bytes += double(part.bytes) * double(family_count(tree, l)) / double(parts[std::size_t(l)].size());
-            squares += part.squares;
-            finite += part.finite;
+    double squares = 0, finite = 0, bytes = with_bytes ? double(coder->tables().size()) : 0;
+    for (std::size_t l = parts.size(); l-- > 0;)
+        for (std::size_t k = 0; k < parts[l].size(); ++k) {
+            const double weight = families_[l][k].weight;
+            bytes += weight * double(parts[l][k].bytes);
+            squares += weight * parts[l][k].squares;
+            finite += weight * double(parts[l][k].finite);
         }
 
-    Estimate result{finite ? squares / double(finite) : 0, 0};
-    // What the sample is short of, or has too much of.
+    Estimate result{finite > 0 ? squares / finite : 0, 0};
+    // What the sample is short of, or has too much of; where not all details are counted it knows better.
+    const bool all_counted = family_count(tree, 0) <= kCountedFamilies;
     const auto ratio = [&](auto model) {
-        if (e_.counts.empty() || counts_.empty()) return 1.0;
+        if (!all_counted || e_.counts.empty() || counts_.empty()) return 1.0;
         const double all = (e_.counts.*model)(tree), some = (counts_.*model)(tree);
         return all > 0 && some > 0 ? all / some : 1.0;
     };
@@ -232,8 +251,11 @@ void StepSearch::find_bytes(double bytes, double overhead) {
     find(start, -std::log(bytes), 0.8, [&] { return -std::log(estimate(true).bytes + overhead); });
 }
 
+// The sample knows how the error changes with the step better than how large it is.
 void StepSearch::correct_mse(double got, double wanted) {
-    set_step(std::max(1.0, e_.tree.quantiser.step * std::pow(wanted / std::max(got, kLeast), 1 / 1.6)));
+    const double step = e_.tree.quantiser.step, thought = estimate(false).mse;
+    if (!(thought > 0 && got > 0)) return set_step(std::max(1.0, step * std::pow(wanted / std::max(got, kLeast), 1 / 1.6)));
+    find(step, std::log(std::max(wanted * thought / got, kLeast)), 1.6, [&] { return std::log(std::max(estimate(false).mse, kLeast)); });
 }
 
 void StepSearch::correct_bytes(double got, double wanted) {

@@ -42,9 +42,14 @@ class StepSearch {
 
     Encoding& e_;
     int& rounds_;
+    struct Tried {
+        std::int64_t family = 0;
+        double weight = 0;  // how many families of its level it stands for
+        Sample::Kept kept;  // of level 0
+    };
     int shift_ = 0;  // the levels' integers have so many bits more than those of the tree that is tried
-    std::vector<std::vector<std::int64_t>> families_;  // of each level: those of level 0 and their ancestors
-    CoefficientCounts counts_;                         // of these families alone
+    std::vector<std::vector<Tried>> families_;  // of each level: those of level 0 and their ancestors
+    CoefficientCounts counts_;                  // of these families alone
 };
 
 }  // namespace voxloom::wavelet
