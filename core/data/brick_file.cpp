@@ -46,12 +46,14 @@ Envelope open_envelope(const BrickFileKind& kind, std::span<const std::byte> fil
     ByteReader reader(file.subspan(8));
     const auto version = reader.number<std::uint32_t>(), endian = reader.number<std::uint32_t>();
     if (endian != kEndian) fail("its byte order is not this machine's");
-    if (version != kind.version) fail("it has version {}, and version {} is known", version, kind.version);
+    if (version < kind.oldest || version > kind.version)
+        fail("it has version {}, and versions {} to {} are known", version, kind.oldest, kind.version);
     const auto head = reader.number<std::uint64_t>(), payload = reader.number<std::uint64_t>();
     const auto hash = reader.number<std::uint64_t>();
     if (head > reader.left() || payload != reader.left() - head)
         fail("it should have {} bytes of head and {} of data, and has {} of both", head, payload, reader.left());
     Envelope envelope;
+    envelope.version = version;
     envelope.head = reader.bytes(head);
     envelope.payload = reader.bytes(payload);
     if (hash_of(file, envelope.head) != hash) fail("its head's checksum is wrong");
@@ -59,14 +61,16 @@ Envelope open_envelope(const BrickFileKind& kind, std::span<const std::byte> fil
 }
 
 void write_brick_file(const std::filesystem::path& path, std::span<const std::byte> front,
-                      std::span<const std::byte> payload, const std::stop_token& stop) {
+                      std::span<const std::byte> payload, const std::stop_token& stop,
+                      const std::function<void(std::size_t, std::size_t)>& written) {
+    constexpr std::size_t most = 8 << 20;
     OutputFile file(path);
     file.write(front);
-    while (!payload.empty()) {
+    for (std::size_t at = 0; at < payload.size(); at += most) {
         check_stop(stop);
-        const auto part = payload.first(std::min<std::size_t>(payload.size(), 8 << 20));
+        const auto part = payload.subspan(at, std::min(payload.size() - at, most));
         file.write(part);
-        payload = payload.subspan(part.size());
+        if (written) written(at, part.size());
     }
     check_stop(stop);
     file.commit();

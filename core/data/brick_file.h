@@ -12,6 +12,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -24,12 +25,11 @@
 namespace voxloom {
 
 struct BrickFileKind {
-    std::string_view magic;  // 8 characters
-    std::uint32_t version;   // the only one that is read
-    std::string_view name;   // "wavelet file"
+    std::string_view magic;         // 8 characters
+    std::uint32_t version, oldest;  // what is written; all from the oldest on are read
 };
 // docs/brick-format.md: bricks that are coded each by itself, whatever the codec.
-inline constexpr BrickFileKind kFlatBrickFile{"voxbrick", 1, "brick file"};
+inline constexpr BrickFileKind kFlatBrickFile{"voxbrick", 1, 1};
 
 // The lowest 32 bits of the 128-bit XXH3.
 std::uint32_t check_of(std::span<const std::byte> bytes);
@@ -37,14 +37,17 @@ std::uint32_t check_of(std::span<const std::byte> bytes);
 // Everything before the payload.
 Bytes enclose(const BrickFileKind& kind, std::span<const std::byte> head, std::uint64_t payload_bytes);
 struct Envelope {
+    std::uint32_t version = 0;
     std::span<const std::byte> head, payload;
 };
 // Throws Error saying what is wrong, without the file's name.
 Envelope open_envelope(const BrickFileKind& kind, std::span<const std::byte> file);
 
-// `front` (what enclose() gave) and the payload, under a temporary name, then renamed.
+// `front` (what enclose() gave) and the payload, under a temporary name, then renamed. written(offset, bytes) hears of
+// each part of the payload that is done with.
 void write_brick_file(const std::filesystem::path& path, std::span<const std::byte> front,
-                      std::span<const std::byte> payload, const std::stop_token& stop);
+                      std::span<const std::byte> payload, const std::stop_token& stop,
+                      const std::function<void(std::size_t, std::size_t)>& written = {});
 
 // dims 3 i64; index to world 16 f64, column by column; unit, name; u8 scalar type, components, colour,
 // significant bits; f64 smallest and largest finite value.

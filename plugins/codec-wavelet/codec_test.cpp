@@ -405,7 +405,7 @@ TEST_F(WaveletFile, GoldenFilesOfEachVersionStayReadable) {
                 if (coder == CoderKind::fast && version != "v4") continue;  // blocks was in its place
                 const std::filesystem::path golden = std::filesystem::path(VOXLOOM_SOURCE_DIR) / "plugins/codec-wavelet/golden" /
                     fmt::format("{}-{}-{}.vxw", version, name_of(coder), voxloom::name_of(type));
-                if (std::getenv("VOXLOOM_WRITE_GOLDEN") && coder != CoderKind::blocks && version == fmt::format("v{}", kFileVersion)) {
+                if (std::getenv("VOXLOOM_WRITE_GOLDEN") && coder != CoderKind::blocks && version == fmt::format("v{}", kWaveletFile.version)) {
                     EncodeOptions options = lossless(coder);
                     options.faces = Faces::shared;
                     write_file(*encoded(*volume, options), golden);

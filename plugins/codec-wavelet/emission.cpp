@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/meter.h"
+#include "core/data/brick_file.h"
 #include "plugins/codec-wavelet/file_format.h"
 #include "plugins/codec-wavelet/payload.h"
 

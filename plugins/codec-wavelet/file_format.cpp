@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 
 #include "core/base/error.h"
-#include "core/base/hash.h"
-#include "core/base/output_file.h"
 #include "core/base/byte_io.h"
+#include "core/data/brick_file.h"
 #include "plugins/codec-wavelet/passes.h"
 #include "plugins/codec-wavelet/statistics_code.h"
 
@@ -16,27 +14,11 @@ namespace voxloom::wavelet {
 
 namespace {
 
-constexpr char kMagic[8] = {'v', 'o', 'x', 'w', 'a', 'v', 'e', '\n'};
-constexpr std::uint32_t kEndian = 0x01020304;
-// magic, version, byte order, bytes of head and payload, hash of the 32 bytes before and the head
-constexpr std::size_t kPreamble = sizeof kMagic + 4 + 4 + 8 + 8 + 8;
-
 // --- head --------------------------------------------------------------------------------------------
 
 void write_tree(const TreeIndex& index, ByteWriter& w) {
     const TreeDesc& tree = index.tree;
-    const VolumeDesc& v = tree.bricks.volume;
-    for (int a = 0; a < 3; ++a) w.number(v.dims[a]);
-    for (int c = 0; c < 4; ++c)
-        for (int r = 0; r < 4; ++r) w.number(v.index_to_world[c][r]);
-    w.text(v.unit);
-    w.text(v.name);
-    w.number(std::uint8_t(v.type));
-    w.number(std::uint8_t(v.components));
-    w.number(std::uint8_t(v.color));
-    w.number(std::uint8_t(v.significant_bits));
-    w.number(v.range ? v.range->min : 0.0);
-    w.number(v.range ? v.range->max : 0.0);
+    write_volume_desc(tree.bricks.volume, w);
     w.number(std::uint8_t(tree.bricks.brick.x));
     w.number(std::uint8_t(tree.bricks.levels.size()));
     for (const LevelDesc& level : tree.bricks.levels)
@@ -46,7 +28,7 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
     w.number(std::uint8_t(tree.split));
     w.number(std::uint8_t(tree.distances));
     w.number(std::uint8_t(tree.faces));
-    w.number(std::uint8_t(v.has_mask));
+    w.number(std::uint8_t(tree.bricks.volume.has_mask));
     w.number(tree.map.step);
     w.number(tree.map.offset);
     w.number(tree.quantiser.step);
@@ -59,24 +41,9 @@ void write_tree(const TreeIndex& index, ByteWriter& w) {
 TreeDesc read_tree(ByteReader& r, std::uint32_t version) {
     TreeDesc tree;
     VolumeDesc& v = tree.bricks.volume;
-    for (int a = 0; a < 3; ++a) v.dims[a] = r.number<std::int64_t>();
-    for (int c = 0; c < 4; ++c)
-        for (int row = 0; row < 4; ++row) v.index_to_world[c][row] = r.number<double>();
-    v.unit = r.text();
-    v.name = r.text();
-    const auto type = r.number<std::uint8_t>();
-    v.components = r.number<std::uint8_t>();
-    v.color = r.number<std::uint8_t>() != 0;
-    v.significant_bits = r.number<std::uint8_t>();
-    const auto lo = r.number<double>(), hi = r.number<double>();
-    v.range = ValueRange{lo, hi};
+    v = read_volume_desc(r);
     tree.bricks.brick = glm::ivec3(r.number<std::uint8_t>());
     const auto levels = r.number<std::uint8_t>();
-    if (type >= kScalarTypes || v.components < 1 || v.components > 4 || v.significant_bits > 64) fail("its voxel type is not one");
-    v.type = ScalarType(type);
-    if (glm::any(glm::lessThan(v.dims, Index3(0)))) fail("its size is negative");
-    (void)v.dense_bytes();
-    if (!(lo <= hi) || !std::isfinite(lo) || !std::isfinite(hi)) fail("its value range is not one");
     const int brick = tree.bricks.brick.x;
     if (brick < 4 || brick > 64 || !std::has_single_bit(unsigned(brick))) fail("its bricks are not 4 to 64 voxels a side");
 
@@ -179,35 +146,14 @@ Bytes head_of(const TreeIndex& index, std::uint64_t payload) {
             }
         write_statistics(index, w);
     }
-    Bytes all;
-    ByteWriter file(all);
-    file.bytes(std::as_bytes(std::span(kMagic)));
-    file.number(kFileVersion);
-    file.number(kEndian);
-    file.number(std::uint64_t(head.size()));
-    file.number(payload);
-    Hasher hasher;
-    hasher.bytes(all);
-    hasher.bytes(head);
-    file.number(hasher.finish().lo);
-    file.bytes(head);
-    return all;
+    return enclose(kWaveletFile, head, payload);
 }
 
 std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload) { return head_of(index, payload).size() + payload; }
 
 void write_file(const WaveletBricks& bricks, const std::filesystem::path& path, const std::stop_token& stop) {
-    constexpr std::size_t most = 8 << 20;
-    OutputFile file(path);
-    file.write(head_of(bricks.index(), bricks.payload().size()));
-    const auto all = bricks.payload();
-    for (std::size_t at = 0; at < all.size(); at += most) {
-        check_stop(stop);
-        const auto part = all.subspan(at, std::min(all.size() - at, most));
-        file.write(part);
-        bricks.forget(at, part.size());
-    }
-    file.commit();
+    write_brick_file(path, head_of(bricks.index(), bricks.payload().size()), bricks.payload(), stop,
+                     [&](std::size_t at, std::size_t bytes) { bricks.forget(at, bytes); });
 }
 
 namespace {
@@ -215,24 +161,11 @@ namespace {
 std::shared_ptr<const WaveletBricks> open(std::span<const std::byte> bytes, std::shared_ptr<const void> keeper,
                                           const MappedFile* file, const std::string& name) {
     try {
-        if (bytes.size() < kPreamble || std::memcmp(bytes.data(), kMagic, sizeof kMagic) != 0)
-            fail("it does not begin like one");
-        ByteReader r(bytes.subspan(sizeof kMagic));
-        const auto version = r.number<std::uint32_t>(), endian = r.number<std::uint32_t>();
-        if (endian != kEndian) fail("its byte order is not this machine's");
-        if (version < 1 || version > kFileVersion) fail("it has version {}, and versions 1 to {} are known", version, kFileVersion);
-        const auto head_size = r.number<std::uint64_t>(), payload = r.number<std::uint64_t>(), hash = r.number<std::uint64_t>();
-        if (head_size > r.left() || payload != r.left() - head_size)
-            fail("it should have {} bytes of head and {} of data, and has {} of both", head_size, payload, r.left());
-        const auto head = r.bytes(head_size);
-        Hasher hasher;
-        hasher.bytes(bytes.first(kPreamble - 8));
-        hasher.bytes(head);
-        if (hasher.finish().lo != hash) fail("its head's checksum is wrong");
-        TreeIndex index = read_head(head, payload, version);
+        const Envelope envelope = open_envelope(kWaveletFile, bytes);
+        TreeIndex index = read_head(envelope.head, envelope.payload.size(), envelope.version);
         index.tree.bricks.compressed_bytes = bytes.size();
-        return std::make_shared<WaveletBricks>(std::move(index),
-                                               Payload{r.bytes(payload), std::move(keeper), 0, file, kPreamble + head_size});
+        return std::make_shared<WaveletBricks>(
+            std::move(index), Payload{envelope.payload, std::move(keeper), 0, file, bytes.size() - envelope.payload.size()});
     } catch (const Error& e) {
         fail("{} is not a wavelet file that can be read: {}; get the file again", name, e.what());
     }

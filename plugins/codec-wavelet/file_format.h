@@ -5,11 +5,12 @@
 #include <memory>
 #include <stop_token>
 
+#include "core/data/brick_file.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"
 
 namespace voxloom::wavelet {
 
-inline constexpr std::uint32_t kFileVersion = 4;  // what is written; all before are read, too
+inline constexpr BrickFileKind kWaveletFile{"voxwave\n", 4, 1};  // docs/wavelet-format.md
 
 // Bytes that a file with this index and so long a payload has.
 std::uint64_t file_bytes(const TreeIndex& index, std::uint64_t payload);

@@ -6,6 +6,7 @@
 
 #include "core/base/byte_io.h"
 #include "core/base/meter.h"
+#include "core/data/brick_file.h"
 #include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/passes.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"

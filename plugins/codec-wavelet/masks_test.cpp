@@ -186,7 +186,7 @@ TEST(Masks, GoldenFilesStayReadable) {
         const std::filesystem::path golden = std::filesystem::path(VOXLOOM_SOURCE_DIR) / "plugins/codec-wavelet/golden" /
             fmt::format("v3-mask-{}-u8.vxw", name_of(coder));
         EncodeReport report;
-        if (std::getenv("VOXLOOM_WRITE_GOLDEN") && kFileVersion == 3) write_file(*encode(*volume, options_for(coder), report), golden);
+        if (std::getenv("VOXLOOM_WRITE_GOLDEN") && kWaveletFile.version == 3) write_file(*encode(*volume, options_for(coder), report), golden);
         const auto opened = open_file(golden);
         EXPECT_TRUE(opened->desc().volume.has_mask);
         expect_valid_voxels(opened, *volume);

@@ -2,10 +2,10 @@
 
 #include <cassert>
 
-#include "core/base/error.h"
-#include "core/base/hash.h"
-#include "core/data/convert.h"
 #include "core/base/byte_io.h"
+#include "core/base/error.h"
+#include "core/data/brick_file.h"
+#include "core/data/convert.h"
 #include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/mask_layer.h"
 #include "plugins/codec-wavelet/passes.h"
@@ -59,8 +59,6 @@ Buffer tree_voxels(const TreeDesc& tree, const FamilyCodec::Planes& planes, std:
 }
 
 }  // namespace
-
-std::uint32_t check_of(std::span<const std::byte> bytes) { return std::uint32_t(hash_bytes(bytes).lo); }
 
 WaveletBricks::WaveletBricks(TreeIndex index, Payload payload)
     : Bricks(index.tree.bricks), index_(std::move(index)), payload_(std::move(payload)) {}

@@ -24,8 +24,6 @@ struct TreeIndex {
     std::vector<std::vector<BrickInfo>> infos;       // of each level's bricks, x fastest
 };
 
-std::uint32_t check_of(std::span<const std::byte> bytes);
-
 class WaveletBricks final : public Bricks {
   public:
     WaveletBricks(TreeIndex index, Payload payload);
