@@ -33,6 +33,26 @@ void clamp_integers(const From* from, std::size_t count, To* to) {
     for (std::size_t i = 0; i < count; ++i) to[i] = To(std::clamp(Wide(from[i]), lo, hi));
 }
 
+// Calls with(T()) where the type is one of integers; false where it is not.
+template <class With>
+bool with_integer(ScalarType type, const With& with) {
+    switch (type) {
+        case ScalarType::u8: with(std::uint8_t{}); return true;
+        case ScalarType::i8: with(std::int8_t{}); return true;
+        case ScalarType::u16: with(std::uint16_t{}); return true;
+        case ScalarType::i16: with(std::int16_t{}); return true;
+        case ScalarType::u32: with(std::uint32_t{}); return true;
+        case ScalarType::i32: with(std::int32_t{}); return true;
+        default: return false;
+    }
+}
+
+// Calls with(From(), To()) where both types are of integers; false where one is not.
+template <class With>
+bool with_integers(ScalarType from, ScalarType to, const With& with) {
+    return !is_float(to) && with_integer(from, [&](auto f) { with_integer(to, [&](auto t) { with(f, t); }); });
+}
+
 }  // namespace
 
 void to_double(ScalarType type, const std::byte* from, std::size_t count, double* to) {
@@ -56,16 +76,11 @@ void convert(ScalarType from_type, const std::byte* from, ScalarType to_type, st
         std::memcpy(to, from, count * bytes_of(from_type));
         return;
     }
-    if (!is_float(from_type) && !is_float(to_type)) {  // several times faster than through double
-        with_type(from_type, [&](auto f) {
-            with_type(to_type, [&](auto t) {
-                if constexpr (std::is_integral_v<decltype(f)> && std::is_integral_v<decltype(t)>)
-                    clamp_integers(reinterpret_cast<const decltype(f)*>(from), count,
-                                   reinterpret_cast<decltype(t)*>(to));
-            });
-        });
+    // Several times faster than through double.
+    if (with_integers(from_type, to_type, [&](auto f, auto t) {
+            clamp_integers(reinterpret_cast<const decltype(f)*>(from), count, reinterpret_cast<decltype(t)*>(to));
+        }))
         return;
-    }
     constexpr std::size_t kChunk = 512;
     double values[kChunk];
     for (std::size_t i = 0; i < count; i += kChunk) {
@@ -87,13 +102,23 @@ void convert_box(const Box& box, ScalarType from_type, const std::byte* from, co
     assert(from_box.contains(box) && to_box.contains(box));
     const Index3 fd = from_box.dims(), td = to_box.dims();
     const std::size_t row = std::size_t(box.dims().x) * std::size_t(components);
-    for (std::int64_t z = box.lo.z; z < box.hi.z; ++z)
-        for (std::int64_t y = box.lo.y; y < box.hi.y; ++y) {
-            const Index3 f = Index3(box.lo.x, y, z) - from_box.lo;
-            const Index3 t = Index3(box.lo.x, y, z) - to_box.lo;
-            convert(from_type, from + std::size_t((f.z * fd.y + f.y) * fd.x + f.x) * from_bytes,
-                    to_type, to + std::size_t((t.z * td.y + t.y) * td.x + t.x) * to_bytes, row);
-        }
+    const auto each_row = [&](auto&& convert_row) {
+        for (std::int64_t z = box.lo.z; z < box.hi.z; ++z)
+            for (std::int64_t y = box.lo.y; y < box.hi.y; ++y) {
+                const Index3 f = Index3(box.lo.x, y, z) - from_box.lo;
+                const Index3 t = Index3(box.lo.x, y, z) - to_box.lo;
+                convert_row(from + std::size_t((f.z * fd.y + f.y) * fd.x + f.x) * from_bytes,
+                            to + std::size_t((t.z * td.y + t.y) * td.x + t.x) * to_bytes);
+            }
+    };
+    // The types are looked at once: rows of bricks are short.
+    if (with_integers(from_type, to_type, [&](auto f, auto t) {
+            each_row([&](const std::byte* a, std::byte* b) {
+                clamp_integers(reinterpret_cast<const decltype(f)*>(a), row, reinterpret_cast<decltype(t)*>(b));
+            });
+        }))
+        return;
+    each_row([&](const std::byte* a, std::byte* b) { convert(from_type, a, to_type, b, row); });
 }
 
 }  // namespace voxloom
