@@ -71,6 +71,10 @@ void draw_port(const Pen& pen, glm::dvec2 at, const PortSpec& port, const NodePo
                 break;
             }
     const float radius = std::max(pen.px(4.5), 1.5f);
+    if (!pen.readable()) {  // seen from far a circle is a dot, and hundreds of them are many triangles
+        const ImVec2 p = pen.at(at);
+        return pen.list.AddRectFilled({p.x - radius, p.y - radius}, {p.x + radius, p.y + radius}, pen.color(color));
+    }
     pen.list.AddCircleFilled(pen.at(at), radius, pen.color(wired || output ? color : theme().node), 12);
     pen.list.AddCircle(pen.at(at), radius, pen.color(color), 12, std::max(pen.px(1.5), 1.f));
     // Optional inputs are quieter; what must be wired is not.
@@ -102,19 +106,21 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
     box.at += moved;
     if (!pen.sees(box)) return;
     const ImVec2 lo = pen.at(box.at), hi = pen.at(box.at + box.size);
-    const float round = pen.px(6);
+    const bool near = pen.readable();
+    const float round = near ? pen.px(6) : 0;
     const bool selected = editor.work.selected.count(node.id) > 0;
     const NodeStatus* status = status_of(editor, node.id);
 
     const bool used = node.use == GraphNode::Use::normal;
     if (!used || (status && status->state == NodeState::not_asked && !status->message.empty())) pen.alpha = 0.5f;
-    pen.list.AddRectFilled({lo.x + pen.px(2), lo.y + pen.px(3)}, {hi.x + pen.px(2), hi.y + pen.px(3)}, pen.color(IM_COL32(0, 0, 0, t.dark ? 70 : 28)), round);
+    if (near) pen.list.AddRectFilled({lo.x + pen.px(2), lo.y + pen.px(3)}, {hi.x + pen.px(2), hi.y + pen.px(3)}, pen.color(IM_COL32(0, 0, 0, t.dark ? 70 : 28)), round);
     pen.list.AddRectFilled(lo, hi, pen.color(t.node), round);
     pen.list.AddRectFilled(lo, {hi.x, lo.y + pen.px(kHeaderHeight)}, pen.color(t.header), round, ImDrawFlags_RoundCornersTop);
     pen.text(box.at + glm::dvec2(12, 5), ports.type ? t.text : t.bad, node.id, kNodeWidth - 40);
     if (status) {
         const ImVec2 dot = pen.at(box.at + glm::dvec2(kNodeWidth - 14, kHeaderHeight / 2));
-        if (status->state == NodeState::not_asked) pen.list.AddCircle(dot, pen.px(4), pen.color(t.muted), 12);
+        if (!near) pen.list.AddRectFilled({dot.x - pen.px(6), dot.y - pen.px(6)}, {dot.x + pen.px(6), dot.y + pen.px(6)}, color_of(status->state));
+        else if (status->state == NodeState::not_asked) pen.list.AddCircle(dot, pen.px(4), pen.color(t.muted), 12);
         else pen.list.AddCircleFilled(dot, pen.px(4), color_of(status->state), 12);
     }
     auto wired = [&](const std::string& key) {

@@ -50,14 +50,14 @@ void draw_picture(const Pen& pen, const SmallPicture& small, const NodeBox& room
 void draw_function(const Pen& pen, const TransferFunction& f, const NodeBox& room) {
     if (f.one.points.empty()) return;
     const double lo = f.one.points.front().value, hi = f.one.points.back().value;
-    constexpr int kColumns = 58;
+    const int columns = pen.readable() ? 58 : 6;
     pen.list.AddRectFilled(pen.at(room.at), pen.at(room.at + room.size), pen.color(theme().canvas), pen.px(3));
-    for (int i = 0; i < kColumns; ++i) {
-        const Emission e = f.one.at(lo + (hi - lo) * (i + 0.5) / kColumns);
+    for (int i = 0; i < columns; ++i) {
+        const Emission e = f.one.at(lo + (hi - lo) * (i + 0.5) / columns);
         const glm::dvec3 c = glm::clamp(voxloom::color_of(e), 0.0, 1.0);
         const double height = std::cbrt(std::clamp(opacity_of(e.a, f.reference_length), 0.0, 1.0)) * room.size.y;
-        const glm::dvec2 foot = room.at + glm::dvec2(room.size.x * i / kColumns, room.size.y);
-        pen.list.AddRectFilled(pen.at(foot - glm::dvec2(0, height)), pen.at(foot + glm::dvec2(room.size.x / kColumns, 0)),
+        const glm::dvec2 foot = room.at + glm::dvec2(room.size.x * i / columns, room.size.y);
+        pen.list.AddRectFilled(pen.at(foot - glm::dvec2(0, height)), pen.at(foot + glm::dvec2(room.size.x / columns, 0)),
                                pen.color(IM_COL32(int(c.r * 255), int(c.g * 255), int(c.b * 255), 255)));
     }
 }
