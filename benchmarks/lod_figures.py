@@ -4,6 +4,7 @@
 promise   the error that a selection promises against the one that its picture has, for a steep and a nearly
           linear transfer function
 sizes     cost of a picture of one size and one promised error against the size of the volume
+bricks    the same against the size of the bricks
 """
 import argparse
 import csv
@@ -57,17 +58,29 @@ def sizes(voxloom, all_sizes):
               f"| {r['rmse']:.4f} |", flush=True)
 
 
+def bricks(voxloom):
+    print("| brick | bricks | pages | MiB uploaded | voxels of the selection, million | samples, million | promised | RMSE |")
+    print("|---|---|---|---|---|---|---|---|")
+    for k in (8, 16, 32):
+        r = run(voxloom, {"tf.preset": "ramp", "detail.max_error": 0.01, "pyramid.brick": f"[{k},{k},{k}]"})
+        view = r["view"]
+        print(f"| {k}³ | {r['bricks']} | {view['pages drawn']:.0f} | {view['bytes uploaded'] / 2**20:.1f} "
+              f"| {r['bricks'] * k**3 / 1e6:.1f} | {view['samples'] / 1e6:.1f} | {r['promised']:.4f} | {r['rmse']:.4f} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("figure", choices=["promise", "sizes"])
+    parser.add_argument("figure", choices=["promise", "sizes", "bricks"])
     parser.add_argument("--voxloom", default=ROOT / "build/release/bin/voxloom", help="the program to run")
     parser.add_argument("--errors", type=float, nargs="+", default=[0.08, 0.04, 0.02, 0.01, 0.005], help="max_error of promise")
     parser.add_argument("--sizes", type=int, nargs="+", default=[128, 256, 384], help="voxels a side of sizes")
     options = parser.parse_args()
     if options.figure == "promise":
         promise(options.voxloom, options.errors)
-    else:
+    elif options.figure == "sizes":
         sizes(options.voxloom, options.sizes)
+    else:
+        bricks(options.voxloom)
 
 
 if __name__ == "__main__":
