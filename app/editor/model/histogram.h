@@ -21,4 +21,18 @@ inline constexpr std::size_t kHistogramBins = 256;
 Histogram histogram_of(const Volume& volume, const std::stop_token& stop = {},
                        std::uint64_t most_voxels = std::uint64_t(4) << 20);
 
+// How often each value occurs with each gradient: boundaries between materials are arcs in it.
+struct GradientHistogram {
+    // kHistogramBins values, equal bins over `range` of the histogram, times kGradientBins gradients, the
+    // smallest first. A gradient is a change by this share of the range along the shortest spacing; bins are
+    // equal in its logarithm, from kLeastGradient to 1, and smaller and larger ones are in the outermost.
+    std::vector<double> counts;
+};
+inline constexpr std::size_t kGradientBins = 64;
+inline constexpr double kLeastGradient = 1e-3;
+
+// By central differences of the first component in the world, one-sided at the border.
+GradientHistogram gradient_histogram_of(const Volume& volume, ValueRange range, const std::stop_token& stop = {},
+                                        std::uint64_t most_voxels = std::uint64_t(1) << 20);
+
 }  // namespace voxloom::editor

@@ -103,6 +103,9 @@ struct FileDialog {
 struct TransferEditor {
     std::string node;
     int dragged = -1, chosen = -1;
+    bool gradients = false;                           // shown behind the function
+    Picture picture{};                                // of them
+    std::shared_ptr<const GradientHistogram> shown{};  // in the picture
 };
 
 // The title or the comment that is typed.
@@ -175,6 +178,7 @@ struct Editor {
     bool marks_wanted = false;  // somebody reads them
     Evaluator::State live;
     Background<Histogram> histograms;
+    Background<GradientHistogram> gradients;
     Background<Thumbnail> small_pictures;
     Background<Image> differences;
     Evaluator evaluator;        // the last: it ends first

@@ -16,6 +16,15 @@ namespace {
 #define GL_CLAMP_TO_EDGE 0x812F
 #endif
 
+void upload(Picture& picture, const Image& image) { upload(picture, image.size(), pixels_of(image)); }
+
+const Image* image_in(const LiveValue* value) {
+    const ImagePtr* image = value ? std::get_if<ImagePtr>(&value->value) : nullptr;
+    return image && *image && (*image)->size().x > 0 && (*image)->size().y > 0 ? image->get() : nullptr;
+}
+
+}  // namespace
+
 void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
     if (!picture.texture) glGenTextures(1, &picture.texture);
     GLint before = 0;
@@ -29,15 +38,6 @@ void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& p
     glBindTexture(GL_TEXTURE_2D, GLuint(before));
     picture.size = size;
 }
-
-void upload(Picture& picture, const Image& image) { upload(picture, image.size(), pixels_of(image)); }
-
-const Image* image_in(const LiveValue* value) {
-    const ImagePtr* image = value ? std::get_if<ImagePtr>(&value->value) : nullptr;
-    return image && *image && (*image)->size().x > 0 && (*image)->size().y > 0 ? image->get() : nullptr;
-}
-
-}  // namespace
 
 std::vector<glm::u8vec4> pixels_of(const Image& image) {
     std::vector<glm::u8vec4> pixels(std::size_t(image.size().x) * std::size_t(image.size().y));
@@ -87,6 +87,7 @@ void delete_textures(Editor& editor) {
     std::ranges::for_each(editor.viewport.pictures, release);
     for (auto& [port, small] : editor.thumbnails) release(small.picture);
     release(editor.viewport.difference.picture);
+    release(editor.transfer.picture);
 }
 
 SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports) {

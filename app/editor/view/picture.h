@@ -9,6 +9,7 @@ namespace voxloom::editor {
 
 // Uploads where the value is another one. False where there is no picture.
 bool update_picture(Picture& picture, const LiveValue* value);
+void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels);
 // |a - b| * scale, made on another thread when one of them is another one; until then the last one stays.
 // False where there is none; the reason is then in `why`.
 bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, std::string& why);

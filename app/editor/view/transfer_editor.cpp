@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "app/editor/model/param_values.h"
-#include "app/editor/view/editor.h"
+#include "app/editor/view/picture.h"
 
 namespace voxloom::editor {
 
@@ -28,6 +28,7 @@ struct Scene {
     ValueRange range{0, 1};
     Rows points{};
     TransferPtr function{};
+    VolumePtr data{};
     std::shared_ptr<const Histogram> histogram{};
     ImVec2 lo{}, hi{};            // of the plot, in pixels
 
@@ -66,7 +67,8 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     std::erase_if(s.points, [](const auto& row) { return row.size() != 2 && row.size() != 5; });
     for (const auto& [port, value] : editor.live.values)
         if (auto* f = std::get_if<TransferPtr>(&value.value); f && port.starts_with(node.id + ".")) s.function = *f;
-    if (VolumePtr volume = data_of(editor, node))
+    s.data = data_of(editor, node);
+    if (const VolumePtr volume = s.data)
         s.histogram = editor.histograms.find({volume}, [volume](const std::stop_token& stop) {
             return std::make_shared<const Histogram>(histogram_of(*volume, stop));
         });
@@ -95,6 +97,30 @@ void draw_histogram(const Scene& s) {
         const float left = std::max(s.place(a, 0).x, s.lo.x), right = std::min(s.place(b, 0).x, s.hi.x);
         if (left < right) list.AddRectFilled({left, s.hi.y - float(std::log1p(counts[i]) / most) * (s.hi.y - s.lo.y)}, {right + 1, s.hi.y}, color);
     }
+}
+
+// Value to the right, gradient upwards, the logarithm of how often both occur as brightness.
+void draw_gradients(const Scene& s) {
+    TransferEditor& state = s.editor.transfer;
+    const VolumePtr volume = s.data;
+    if (!state.gradients || !volume || !s.histogram) return;
+    const ValueRange range = s.histogram->range;
+    const auto made = s.editor.gradients.find({volume}, [volume, range](const std::stop_token& stop) {
+        return std::make_shared<const GradientHistogram>(gradient_histogram_of(*volume, range, stop));
+    });
+    if (!made) return;
+    if (made != state.shown) {
+        const double most = std::log1p(*std::ranges::max_element(made->counts));
+        std::vector<glm::u8vec4> pixels;
+        for (std::size_t row = kGradientBins; row-- > 0;)
+            for (std::size_t column = 0; column < kHistogramBins; ++column) {
+                const double share = most > 0 ? std::log1p(made->counts[row * kHistogramBins + column]) / most : 0;
+                pixels.emplace_back(190, 205, 225, std::uint8_t(share * 200));
+            }
+        upload(state.picture, {int(kHistogramBins), int(kGradientBins)}, pixels);
+        state.shown = made;
+    }
+    ImGui::GetWindowDrawList()->AddImage(texture_of(state.picture), {s.place(s.share(range.min), 0).x, s.lo.y}, {s.place(s.share(range.max), 0).x, s.hi.y});
 }
 
 // The function as it was evaluated: its opacity as a height, its colour below.
@@ -251,7 +277,10 @@ bool has_transfer_editor(const NodeType& type) {
 void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType& type) {
     const GraphNode* node = editor.work.graph().find(id);
     if (!node) return;
-    if (editor.transfer.node != id) editor.transfer = {id};
+    if (editor.transfer.node != id) {
+        editor.transfer.node = id;
+        editor.transfer.dragged = editor.transfer.chosen = -1;
+    }
     Scene s = scene_of(editor, *node, type);
     const float width = ImGui::GetContentRegionAvail().x, height = ui(150);
     s.lo = ImGui::GetCursorScreenPos();
@@ -261,7 +290,7 @@ void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType&
     ImGui::GetWindowDrawList()->AddRectFilled(s.lo, s.hi, theme().canvas, ui(4));
     if (s.editable) handle_mouse(s);
     ImGui::GetWindowDrawList()->PushClipRect(s.lo, s.hi, true);
-    draw_histogram(s);
+    editor.transfer.gradients ? draw_gradients(s) : draw_histogram(s);
     draw_function(s);
     ImGui::GetWindowDrawList()->PopClipRect();
     draw_axes(s);
@@ -274,7 +303,12 @@ void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType&
         if (ImGui::Button("Turn into points")) turn_into_points(s);
         mark(editor, "into-points");
         tooltip("Writes the preset's function as points that can be dragged; the picture stays the same.");
+        ImGui::SameLine();
     }
+    ImGui::Checkbox("Gradients", &editor.transfer.gradients);
+    mark(editor, "gradients");
+    tooltip("Behind the function: how often each value occurs, or each value (to the right) with each gradient (upwards, from a "
+            "thousandth of the range a voxel to all of it); boundaries between materials are arcs.");
 }
 
 }  // namespace voxloom::editor
