@@ -1,5 +1,5 @@
 // Loops run along the rows of a band, over as many blocks as stand side by side, so that wide registers are full: block
-// by block the same took six times as long.
+// by block the same took five times as long.
 #include "plugins/codec-wavelet/quantiser.h"
 
 #include <algorithm>
