@@ -2,15 +2,15 @@
 // step outside. CharLS may not come back from what nobody encoded, so its bricks are not decoded.
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
-#include "core/base/hash.h"
+#include "fuzz/mended_file.h"
 #include "plugins/codec-baseline/flat_bricks.h"
 
 namespace {
 
 using namespace voxloom;
+using voxloom::fuzz::as_file_and_mended;
 using namespace voxloom::baseline;
 
 constexpr std::uint64_t kMostBytes = 1 << 22;  // of a brick: honest files have larger ones, which only take longer
@@ -25,25 +25,6 @@ void decode_some(const FlatBricks& bricks) {
         } catch (const Error&) {
         }
     }
-}
-
-// The checksum of the head that an honest writer would have put in, so that the fuzzer gets past it.
-void mend_checksum(std::vector<std::byte>& file) {
-    constexpr std::size_t preamble = 40;
-    if (file.size() < preamble) return;
-    std::uint64_t head = 0;
-    std::memcpy(&head, file.data() + 16, 8);
-    if (head > file.size() - preamble) {
-        head = file.size() - preamble;
-        std::memcpy(file.data() + 16, &head, 8);
-    }
-    const std::uint64_t payload = file.size() - preamble - head;
-    std::memcpy(file.data() + 24, &payload, 8);
-    Hasher hasher;
-    hasher.bytes(std::span(file).first(32));
-    hasher.bytes(std::span(file).subspan(preamble, std::size_t(head)));
-    const std::uint64_t hash = hasher.finish().lo;
-    std::memcpy(file.data() + 32, &hash, 8);
 }
 
 // A brick's bytes alone. The first bytes choose the codec, its setting and the form.
@@ -70,15 +51,8 @@ void decode_one(std::span<const std::byte> in) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    const auto* first = reinterpret_cast<const std::byte*>(data);
-    decode_one({first, size});
-    std::vector<std::byte> file(first, first + size);
-    for (int mended = 0; mended < 2; ++mended) {
-        if (mended) mend_checksum(file);
-        try {
-            decode_some(*open_bytes(file, nullptr, "fuzzed"));
-        } catch (const Error&) {
-        }
-    }
+    const auto in = std::as_bytes(std::span(data, size));
+    decode_one(in);
+    as_file_and_mended(in, [](std::span<const std::byte> file) { decode_some(*open_bytes(file, nullptr, "fuzzed")); });
     return 0;
 }

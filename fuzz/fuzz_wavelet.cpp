@@ -1,17 +1,19 @@
 // Any bytes as a wavelet file, and as what stands behind an intact head: refused with an Error, or decoded
 // without a step outside.
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/hash.h"
 #include "core/data/brick_cache.h"
+#include "fuzz/mended_file.h"
+#include "plugins/codec-wavelet/exact_layer.h"
 #include "plugins/codec-wavelet/file_format.h"
+#include "plugins/codec-wavelet/mask_layer.h"
 
 namespace {
 
 using namespace voxloom;
+using voxloom::fuzz::as_file_and_mended;
 using namespace voxloom::wavelet;
 
 void decode_some(const BricksPtr& bricks) {
@@ -27,25 +29,6 @@ void decode_some(const BricksPtr& bricks) {
         } catch (const Error&) {
         }
     }
-}
-
-// The same checksums an honest writer would have put in, so that the fuzzer gets past them.
-void mend_checksum(std::vector<std::byte>& file) {
-    constexpr std::size_t preamble = 40;
-    if (file.size() < preamble) return;
-    std::uint64_t head = 0;
-    std::memcpy(&head, file.data() + 16, 8);
-    if (head > file.size() - preamble) {
-        head = file.size() - preamble;
-        std::memcpy(file.data() + 16, &head, 8);
-    }
-    const std::uint64_t payload = file.size() - preamble - head;
-    std::memcpy(file.data() + 24, &payload, 8);
-    Hasher hasher;
-    hasher.bytes(std::span(file).first(32));
-    hasher.bytes(std::span(file).subspan(preamble, std::size_t(head)));
-    const std::uint64_t hash = hasher.finish().lo;
-    std::memcpy(file.data() + 32, &hash, 8);
 }
 
 // A coder's bytes alone: where checksums would hide most of it. The first byte chooses the coder and the size.
@@ -64,18 +47,29 @@ void decode_details(std::span<const std::byte> in) {
     }
 }
 
+// Masks, distances and patches alone. The first byte chooses the type.
+void decode_layers(std::span<const std::byte> in) {
+    if (in.empty()) return;
+    const auto type = ScalarType(std::uint8_t(in[0]) % kScalarTypes);
+    constexpr std::size_t count = 5 * 4 * 3;
+    std::vector<std::byte> values(count * bytes_of(type));
+    const auto refused = [](auto&& decode) {
+        try {
+            decode();
+        } catch (const Error&) {
+        }
+    };
+    refused([&] { decode_mask(in.subspan(1), {5, 4, 3}); });
+    refused([&] { decode_distances(type, in.subspan(1), values.data(), count); });
+    refused([&] { decode_patches(type, in.subspan(1), values.data(), count); });
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-    const auto* first = reinterpret_cast<const std::byte*>(data);
-    decode_details({first, size});
-    std::vector<std::byte> file(first, first + size);
-    for (int mended = 0; mended < 2; ++mended) {
-        if (mended) mend_checksum(file);
-        try {
-            decode_some(open_bytes(file, nullptr, "fuzzed"));
-        } catch (const Error&) {
-        }
-    }
+    const auto in = std::as_bytes(std::span(data, size));
+    decode_details(in);
+    decode_layers(in);
+    as_file_and_mended(in, [](std::span<const std::byte> file) { decode_some(open_bytes(file, nullptr, "fuzzed")); });
     return 0;
 }
