@@ -5,6 +5,7 @@
 #include <limits>
 #include <unordered_map>
 
+#include "core/base/meter.h"
 #include "core/base/text.h"
 #include "core/graph/node.h"
 #include "plugins/render-slicer/blocks.h"
@@ -162,10 +163,25 @@ void load_atlas(BrickPlan& plan, const std::vector<BrickId>& wanted, const Brick
     }
 }
 
-// Which blocks of space can be seen, in the bricks that are drawn there.
-void find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, const Atlas& atlas,
-                    const BrickRequest& request, BrickScene& scene) {
-    const double least = scene.range.min;
+// What find_occupancy() depends on beside the bricks themselves, whose values do not change.
+Hash occupancy_key(const std::vector<Page>& pages, const Atlas& atlas, const BrickRequest& request) {
+    Hasher h;
+    h.text("occupancy").hash(request.visible_key).value(request.component);
+    auto box = [&](auto v) { h.value(v.x).value(v.y).value(v.z); };
+    box(atlas.block());
+    for (const Page& p : pages) {
+        h.value(p.brick.level);
+        box(p.brick.index);
+        box(p.cell.lo);
+        box(p.cell.hi);
+        h.value(p.parent ? p.parent->level : -1);
+    }
+    return h.finish();
+}
+
+BrickOccupancy find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, const Atlas& atlas,
+                              const BrickRequest& request, double least) {
+    BrickOccupancy out;
     // The finest page's blocks, coarser where there would be too many to leap between.
     int finest = int(desc.levels.size()) - 1;
     for (const Page& p : pages) finest = std::min(finest, p.brick.level);
@@ -228,15 +244,16 @@ void find_occupancy(const BricksDesc& desc, const std::vector<Page>& pages, cons
         }
         seen = std::move(wider);
     }
-    scene.block_size = glm::vec3(size);
-    scene.blocks = grid;
-    scene.seen = std::size_t(std::ranges::count(seen, 1));
-    if (scene.seen == 0) return;
+    out.block_size = glm::vec3(size);
+    out.blocks = grid;
+    out.seen = std::size_t(std::ranges::count(seen, 1));
+    if (out.seen == 0) return out;
     const std::vector<std::int8_t> distances = leaps(grid, seen);
     auto texture = std::make_shared<gpu::Texture>(
         gpu::make_texture(GL_TEXTURE_3D, GL_R8I, grid, GL_NEAREST, "the blocks of the bricks"));
     gpu::upload(*texture, {0, 0, 0}, grid, GL_RED_INTEGER, GL_BYTE, distances.data());
-    scene.occupancy = texture;
+    out.texture = texture;
+    return out;
 }
 
 }  // namespace
@@ -280,11 +297,22 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
     // The last picture's tables make room for this one's.
     const Hash tables = Hasher().text("tables").finish();
     Keep::instance().drop(bricks, tables);
-    Keep::instance().make_room(table_bytes(desc, plan.grid));
-    find_occupancy(desc, pages, *atlas, request, scene);
-    if (!what_is_there) ev.count("blocks", double(scene.blocks.x) * double(scene.blocks.y) * double(scene.blocks.z));
-    if (!what_is_there) ev.count("blocks drawn", double(scene.seen));
-    if (scene.seen == 0) return scene;
+    const std::uint64_t room = table_bytes(desc, plan.grid);
+    const Hash key = occupancy_key(pages, *atlas, request);
+    scene.occupancy = Keep::instance().get<BrickOccupancy>(bricks, key, [&](std::uint64_t& bytes) {
+        const std::int64_t start = wall_ns();
+        Keep::instance().make_room(room);
+        auto made = std::make_shared<BrickOccupancy>(find_occupancy(desc, pages, *atlas, request, scene.range.min));
+        if (made->texture) bytes += made->texture->bytes;
+        ev.count("tables of blocks built");
+        ev.count("table ms", double(wall_ns() - start) * 1e-6);
+        return made;
+    });
+    const glm::dvec3 blocks(scene.occupancy->blocks);
+    if (!what_is_there) ev.count("blocks", blocks.x * blocks.y * blocks.z);
+    if (!what_is_there) ev.count("blocks drawn", double(scene.occupancy->seen));
+    if (scene.occupancy->seen == 0) return scene;
+    Keep::instance().make_room(room - std::min(room, scene.occupancy->texture->bytes));
 
     PageGrid grid = what_is_there ? grid_of(desc, pages) : plan.grid;
     if (request.in_view && atlas->places().whole()) {
@@ -328,7 +356,6 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
         field->voxels.textures.push_back({"page_table", page_table(desc, grid, *atlas)});
     }
     Keep::instance().get<gpu::FieldSource>(bricks, tables, [&](std::uint64_t& bytes) {
-        bytes += scene.occupancy->bytes;
         for (std::size_t i = 1; i < field->voxels.textures.size(); ++i) bytes += field->voxels.textures[i].texture->bytes;
         return field;
     });

@@ -7,6 +7,7 @@
 // by side in the atlas are one page; where that is all there is, it is drawn as a volume is.
 #pragma once
 
+#include "core/base/hash.h"
 #include "core/data/selection.h"
 #include "core/gpu/source.h"
 #include "plugins/render-slicer/atlas.h"
@@ -18,14 +19,20 @@ class Evaluation;
 
 namespace voxloom::slicer {
 
+// Which blocks of space can be seen, in the bricks that are drawn there, and how far to leap; as for a dense
+// volume. It depends on no camera.
+struct BrickOccupancy {
+    gpu::TexturePtr texture;         // null: nothing is seen
+    glm::vec3 block_size{1.0f};      // index coordinates
+    glm::ivec3 blocks{0};
+    std::size_t seen = 0;            // blocks
+};
+
 struct BrickScene {
     std::shared_ptr<const gpu::FieldSource> field;  // source-bricks, or source-level where it is one level
     std::shared_ptr<const Atlas> atlas;
     ValueRange range;                // of every value that any brick can hold
-    gpu::TexturePtr occupancy;       // as for a dense volume; null: nothing is seen
-    glm::vec3 block_size{1.0f};      // index coordinates
-    glm::ivec3 blocks{0};
-    std::size_t seen = 0;            // blocks
+    std::shared_ptr<const BrickOccupancy> occupancy;  // null: there are no bricks
     bool one_level = false;          // one page is all there is
     glm::vec3 cell_size{1.0f};       // index coordinates
     glm::ivec3 cells{0};
@@ -46,6 +53,7 @@ struct BrickRequest {
     double slab = 1;
     // Whether anything with values between lo and hi is seen, where none is below `least`.
     std::function<bool(double least, double lo, double hi)> visible;
+    Hash visible_key;                // of all that the answer depends on
     // Whether rays may come to a box of voxels of level 0. Null: pages are not joined, each is a brick.
     std::function<bool(const Box&)> in_view;
     std::uint64_t gpu_bytes = 0;     // that bricks and all tables may take at once ...

@@ -429,6 +429,27 @@ TEST(BrickPath, TheAtlasKeepsItsLimitAndItsBricks) {
     }
 }
 
+TEST(BrickPath, ANewCameraBuildsNothing) {
+    // What can be seen where depends on bricks, selection and transfer function, and is found once for each.
+    const VolumePtr volume = blob({64, 64, 64});
+    const BricksPtr bricks = pyramid(volume, 8);
+    const SelectionPtr mixed = two_levels(bricks->desc(), 3, true), fine = level_of(bricks->desc(), 0);
+    const TransferPtr all = smooth(240), bright = transfer({{{120, Emission(0)}, {240, Emission(0.05, 0.02, 0, 0.05)}}});
+    auto built = [&](const SelectionPtr& selection, const TransferPtr& tf, glm::dvec3 from, const char* more = "") {
+        NodeRun run = draw(bricks, selection, tf, looking(from, volume->desc(), kPerspective), more);
+        EXPECT_GT(run.counters["blocks drawn"], 0);
+        return run.counters["tables of blocks built"];
+    };
+    for (const SelectionPtr& s : {mixed, fine}) {
+        EXPECT_EQ(built(s, all, {1, 1, 1}), 1);
+        EXPECT_EQ(built(s, all, {1, 0, 0.2}), 0);
+        EXPECT_EQ(built(s, bright, {1, 0, 0.2}), 1);
+        EXPECT_EQ(built(s, bright, {-1, 0.3, 0.2}, ", shading: true"), 0);
+        EXPECT_EQ(built(s, bright, {-1, 0.3, 0.2}, ", reconstruction: tricubic"), 1);
+    }
+    EXPECT_EQ(built(mixed, all, {0, 1, 1}), 0);
+}
+
 TEST(BrickPath, BricksComeAndGoWithoutATrace) {
     // A limit that holds one of two selections: each picture evicts the other's bricks.
     const VolumePtr volume = blob({128, 128, 128});

@@ -153,21 +153,22 @@ bool is_visible(const Scene& scene, double least, double lo, double hi) {
     return scene.transfer->max_extinction(s.compositing == S::Compositing::mip ? least : lo, hi) > 0;
 }
 
+// All that is_visible() depends on beside the values.
+Hash what_is_visible(const Scene& scene) {
+    const S& s = scene.settings;
+    if (s.compositing == S::Compositing::isosurface) return key("iso", s.iso_value);
+    return s.compositing == S::Compositing::mip ? key("mip", hash_of(*scene.transfer), {}) : hash_of(*scene.transfer);
+}
+
 // Which blocks can be seen, and how far to leap where they cannot.
 void find_occupancy(const Scene& scene, const std::shared_ptr<const void>& owner, Prepared& p,
                     Evaluation& ev) {
-    const S& s = scene.settings;
-    const TransferFunction& tf = *scene.transfer;
-    const bool iso = s.compositing == S::Compositing::isosurface;
-    const bool mip = s.compositing == S::Compositing::mip;
     struct Kept {
         TexturePtr texture;
         std::size_t seen = 0;
     };
-    Hash what = iso ? key("iso", s.iso_value)
-                    : mip ? key("mip", hash_of(tf), {}) : hash_of(tf);
     auto kept = Keep::instance().get<Kept>(
-        owner, key("occupancy", what, p.blocks_key),
+        owner, key("occupancy", what_is_visible(scene), p.blocks_key),
         [&](std::uint64_t& bytes) {
             auto out = std::make_shared<Kept>();
             std::vector<std::uint8_t> seen(p.blocks->count());
@@ -234,6 +235,7 @@ BrickJob plan_bricks(const Scene& scene, const View& view, Evaluation& ev) {
         }
         return is_visible(scene, least, lo, hi);
     };
+    request.visible_key = cubic ? key("cubic", what_is_visible(scene), {}) : what_is_visible(scene);
     request.in_view = [&view](const Box& box) { return view.may_meet(box); };
     const TransferFunction2D* two = scene.transfer->two.get();
     const std::uint64_t texels = two ? std::uint64_t(two->dims.x) * std::uint64_t(two->dims.y)
@@ -249,10 +251,12 @@ void prepare_bricks(BrickJob& job, bool what_is_there, Evaluation& ev, Prepared&
     p.bricks = load_bricks(job.plan, job.request, ev, what_is_there);
     p.field = p.bricks->field;
     p.range = p.bricks->range;
-    p.occupancy = p.bricks->occupancy;
-    p.seen = p.bricks->seen;
-    p.block_size = p.bricks->block_size;
-    p.block_grid = p.bricks->blocks;
+    if (const BrickOccupancy* o = p.bricks->occupancy.get()) {
+        p.occupancy = o->texture;
+        p.seen = o->seen;
+        p.block_size = o->block_size;
+        p.block_grid = o->blocks;
+    }
     if (!p.bricks->field) return;
     const Atlas& atlas = *p.bricks->atlas;
     if (job.request.gradient_side)

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+
+#include "plugins/render-slicer/blocks.h"
 
 using namespace voxloom;
 using namespace voxloom::slicer;
@@ -131,4 +135,24 @@ TEST(NarrowPeak, IsOneOfAFewBins) {
 TEST(PreintegratedTable, ZeroIsExactlyZero) {
     TransferFunction1D tf{{{0, Emission(0)}}};
     for (const glm::vec4& e : preintegrated_table(tf, {0, 1}, 64, 1)) EXPECT_EQ(e, glm::vec4(0));
+}
+
+TEST(Leaps, AreTheDistancesToTheNearestBlockOfTheOtherKind) {
+    std::mt19937 random(3);
+    for (const glm::ivec3 n : {glm::ivec3(1, 1, 1), {1, 1, 9}, {2, 7, 1}, {7, 5, 6}, {17, 6, 5}, {300, 1, 1}, {1, 1, 300}})
+        for (const unsigned one_in : {2u, 20u, 200u, ~0u}) {
+            std::vector<std::uint8_t> seen(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z));
+            for (std::uint8_t& s : seen) s = random() % one_in == 0;
+            auto place = [&](std::size_t i) { return glm::ivec3(int(i) % n.x, int(i) / n.x % n.y, int(i) / n.x / n.y); };
+            const std::vector<std::int8_t> distances = leaps(n, seen);
+            ASSERT_EQ(distances.size(), seen.size());
+            for (std::size_t i = 0; i < seen.size(); ++i) {
+                int nearest = 127;
+                for (std::size_t o = 0; o < seen.size(); ++o) {
+                    const glm::ivec3 away = glm::abs(place(o) - place(i));
+                    if (seen[o] != seen[i]) nearest = std::min(nearest, std::max({away.x, away.y, away.z}));
+                }
+                ASSERT_EQ(distances[i], seen[i] ? nearest : -nearest) << i << " of " << n.x << " x " << n.y << " x " << n.z;
+            }
+        }
 }
