@@ -5,7 +5,6 @@
 #include <limits>
 #include <unordered_map>
 
-#include "core/base/meter.h"
 #include "core/base/text.h"
 #include "core/graph/node.h"
 #include "plugins/render-slicer/blocks.h"
@@ -300,12 +299,10 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
     const std::uint64_t room = table_bytes(desc, plan.grid);
     const Hash key = occupancy_key(pages, *atlas, request);
     scene.occupancy = Keep::instance().get<BrickOccupancy>(bricks, key, [&](std::uint64_t& bytes) {
-        const std::int64_t start = wall_ns();
         Keep::instance().make_room(room);
         auto made = std::make_shared<BrickOccupancy>(find_occupancy(desc, pages, *atlas, request, scene.range.min));
         if (made->texture) bytes += made->texture->bytes;
         ev.count("tables of blocks built");
-        ev.count("table ms", double(wall_ns() - start) * 1e-6);
         return made;
     });
     const glm::dvec3 blocks(scene.occupancy->blocks);
