@@ -118,10 +118,8 @@ namespace {
 void relax(const std::uint8_t* from, const std::uint8_t* seen_from, std::uint8_t* to, const std::uint8_t* seen_to,
            int n, int shift) {
     const int begin = std::max(0, -shift), end = std::min(n, n - shift);
-    from += shift;
-    seen_from += shift;
     for (int i = begin; i < end; ++i) {
-        const std::uint8_t d = seen_from[i] == seen_to[i] ? std::uint8_t(from[i] + 1) : std::uint8_t(1);
+        const std::uint8_t d = seen_from[i + shift] == seen_to[i] ? std::uint8_t(from[i + shift] + 1) : std::uint8_t(1);
         to[i] = std::min(to[i], d);
     }
 }
