@@ -67,15 +67,18 @@ class Keep {
         entries_.remove_if([&](const Entry& e) { return e.key == key && same_owner(e.owner, owner); });
     }
 
-    // Drops what is over the limit or has lost its owner.
+    // Drops what is over the limit, or too much to look through, or has lost its owner.
     void shrink(std::uint64_t byte_limit) {
         entries_.remove_if([](const Entry& e) { return e.owner.expired(); });
         std::uint64_t now = held();
-        while (now > byte_limit && !entries_.empty()) {
+        while (!entries_.empty() && (now > byte_limit || entries_.size() > kMostThings)) {
             now -= entries_.back().bytes;
             entries_.pop_back();
         }
     }
+
+    // A camera that moves leaves a small table for every selection, and each is looked at to find another.
+    static constexpr std::size_t kMostThings = 512;
 
   private:
     struct Entry {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "plugins/render-slicer/blocks.h"
+#include "plugins/render-slicer/keep.h"
 
 using namespace voxloom;
 using namespace voxloom::slicer;
@@ -155,4 +156,24 @@ TEST(Leaps, AreTheDistancesToTheNearestBlockOfTheOtherKind) {
                 ASSERT_EQ(distances[i], seen[i] ? nearest : -nearest) << i << " of " << n.x << " x " << n.y << " x " << n.z;
             }
         }
+}
+
+TEST(Keep, IsNeverTooMuchToLookThrough) {
+    Keep keep;
+    const auto owner = std::make_shared<const int>(0);
+    std::size_t made = 0;
+    auto get = [&](std::size_t i) {
+        keep.begin(~std::uint64_t(0));
+        return *keep.get<std::size_t>(owner, Hasher().value(i).finish(), [&](std::uint64_t&) {
+            ++made;
+            return std::make_shared<std::size_t>(i);
+        });
+    };
+    for (std::size_t i = 0; i < 2 * Keep::kMostThings; ++i) {
+        EXPECT_EQ(get(0), 0u);  // again and again
+        EXPECT_EQ(get(i), i);
+    }
+    EXPECT_EQ(made, 2 * Keep::kMostThings);
+    get(1);
+    EXPECT_EQ(made, 2 * Keep::kMostThings + 1);
 }
