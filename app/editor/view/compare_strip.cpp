@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "app/editor/view/actions.h"
 #include "app/editor/view/editor.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
@@ -14,7 +15,7 @@ namespace voxloom::editor {
 
 namespace {
 
-constexpr double kText = 12, kLine = 15, kNames = 92, kColumn = 84;
+constexpr double kText = 12, kLine = 13, kNames = 92, kColumn = 84, kButtons = 26, kRows = 9;
 
 ImU32 color_of_branch(std::size_t k) {
     const Theme& t = theme();
@@ -123,8 +124,13 @@ void draw_tried(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo, 
     if (clicked) edit(editor, [&] { bring_back(editor.work.document, chosen, editor.registry); });
 }
 
-void draw_sweep_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at) {
+void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at) {
     ImGui::SetCursorScreenPos(at);
+    const Action& numbers = action("numbers");
+    if (ImGui::SmallButton(editor.viewport.numbers ? "Hide numbers" : "Show numbers")) numbers.run(editor);
+    mark(editor, "numbers");
+    tooltip(fmt::format("{}  ({})", numbers.doc, key_text(numbers)));
+    ImGui::SameLine();
     if (editor.sweep) {
         const std::string text = fmt::format("Stop, {} of {}", std::min(editor.sweep->next, editor.sweep->values.size()), editor.sweep->values.size());
         if (ImGui::SmallButton(text.c_str())) editor.sweep.reset();
@@ -158,19 +164,21 @@ void update_branches(Editor& editor) {
 
 double compare_strip_height(const Editor& editor, double room) {
     if (editor.viewport.mode == Viewport::Mode::single) return 0;
-    const double height = double(ui(9 * kLine + 34));
-    return room > 1.6 * height ? height : 0;
+    // The pictures keep more than half of the height.
+    const double buttons = double(ui(kButtons)), all = buttons + double(ui(kRows * kLine + 6));
+    return editor.viewport.numbers && room > 2 * all ? all : room > 4 * buttons ? buttons : 0;
 }
 
 void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size) {
     const std::vector<Branch>& branches = editor.branches;
     ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().panel);
-    const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(6));
+    draw_buttons(editor, branches, im(lo + glm::dvec2(ui(8), ui(3))));
+    if (size.y < double(ui(kButtons + kLine))) return;
+    const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(kButtons));
     draw_numbers(editor, branches, im(table));
-    draw_sweep_buttons(editor, branches, im(table + glm::dvec2(0, ui(9 * kLine + 3))));
     const double left = lo.x + double(ui(kNames + kColumn * double(branches.size()) + 16));
     if (left + double(ui(110)) > lo.x + size.x) return;  // no room for a plot
-    draw_tried(editor, branches, {float(left), float(lo.y + ui(6))}, {float(lo.x + size.x - ui(8)), float(lo.y + size.y - ui(6))});
+    draw_tried(editor, branches, {float(left), float(table.y)}, {float(lo.x + size.x - ui(8)), float(lo.y + size.y - ui(6))});
 }
 
 }  // namespace voxloom::editor

@@ -85,6 +85,7 @@ struct Viewport {
     Difference difference;
     enum class Handle { none, move, turn } held = Handle::none;  // of the cutting plane
     double wipe = 0.5;         // share of the width that shows the first picture
+    bool numbers = true;       // shown below compared pictures
     double zoom = 0;           // screen pixels a picture pixel; 0: fitted
     glm::dvec2 offset{0.0};    // of the picture's middle from the viewport's, in screen pixels
 };

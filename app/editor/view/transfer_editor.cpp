@@ -266,6 +266,20 @@ void turn_into_points(const Scene& s) {
     });
 }
 
+// Above the plot, where they are seen however low the panel is.
+void draw_choices(const Scene& s) {
+    if (!s.editable && s.function) {
+        if (ImGui::Button("Turn into points")) turn_into_points(s);
+        mark(s.editor, "into-points");
+        tooltip("Writes the preset's function as points that can be dragged; the picture stays the same.");
+        ImGui::SameLine();
+    }
+    ImGui::Checkbox("Gradients", &s.editor.transfer.gradients);
+    mark(s.editor, "gradients");
+    tooltip("Behind the function: how often each value occurs, or each value (to the right) with each gradient (upwards, from a "
+            "thousandth of the range a voxel to all of it); boundaries between materials are arcs.");
+}
+
 }  // namespace
 
 bool has_transfer_editor(const NodeType& type) {
@@ -282,6 +296,7 @@ void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType&
         editor.transfer.dragged = editor.transfer.chosen = -1;
     }
     Scene s = scene_of(editor, *node, type);
+    draw_choices(s);
     const float width = ImGui::GetContentRegionAvail().x, height = ui(150);
     s.lo = ImGui::GetCursorScreenPos();
     s.hi = {s.lo.x + width, s.lo.y + height};
@@ -296,19 +311,9 @@ void draw_transfer_editor(Editor& editor, const std::string& id, const NodeType&
     draw_axes(s);
     if (s.editable) draw_points(s);
     ImGui::Dummy({0, ui(14)});
-    if (s.editable) {
-        draw_chosen(s);
-        wrapped_in(theme().muted, "Drag points; a double click adds one, a right click removes it.");
-    } else if (s.function) {
-        if (ImGui::Button("Turn into points")) turn_into_points(s);
-        mark(editor, "into-points");
-        tooltip("Writes the preset's function as points that can be dragged; the picture stays the same.");
-        ImGui::SameLine();
-    }
-    ImGui::Checkbox("Gradients", &editor.transfer.gradients);
-    mark(editor, "gradients");
-    tooltip("Behind the function: how often each value occurs, or each value (to the right) with each gradient (upwards, from a "
-            "thousandth of the range a voxel to all of it); boundaries between materials are arcs.");
+    if (!s.editable) return;
+    draw_chosen(s);
+    wrapped_in(theme().muted, "Drag points; a double click adds one, a right click removes it.");
 }
 
 }  // namespace voxloom::editor
