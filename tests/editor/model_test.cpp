@@ -19,6 +19,7 @@
 #include "app/editor/model/settings.h"
 #include "app/editor/model/thumbnail.h"
 #include "core/base/error.h"
+#include "core/data/dense_pyramid.h"
 #include "tests/support/fake_nodes.h"
 #include "tests/support/volumes.h"
 
@@ -485,6 +486,22 @@ TEST(Thumbnail, showsTheMiddleSliceOfAVolume) {
     EXPECT_LE(large->size.x, 2 * kThumbnailPixels);
     EXPECT_EQ(large->pixels[0].r, 0);
     EXPECT_EQ(large->pixels[1].r, 255);
+}
+
+TEST(Thumbnail, showsTheCoarsestLevelOfBricksThatIsFineEnough) {
+    using voxloom::testing::make_volume;
+    BrickCache cache(64 << 20);
+    auto small_of = [&](Index3 dims, auto&& f) {
+        return thumbnail_of(make_dense_pyramid(make_volume(dims, ScalarType::u8, f), glm::ivec3(16), PyramidFilter::subsample), cache);
+    };
+    // Level 1 is 70 x 65 x 64; its middle slice is slice 64 of the volume.
+    const auto small = small_of({139, 130, 127}, [](auto x, auto y, auto z) { return z == 64 && x >= 70 && y >= 66 ? 200 : z == 64 ? 10 : 100; });
+    ASSERT_EQ(small->size, glm::ivec2(70, 65));
+    EXPECT_EQ(small->pixels[0].r, 0);
+    EXPECT_EQ(small->pixels[69].r, 255) << "the last row is at the top";
+    EXPECT_EQ(small->pixels[64 * 70 + 69].r, 0);
+    EXPECT_EQ(small_of({127, 127, 1}, [](auto...) { return 1; })->size, glm::ivec2(64, 64));
+    EXPECT_EQ(small_of({40, 33, 17}, [](auto...) { return 1; })->size, glm::ivec2(40, 33));
 }
 
 TEST(Background, makesWhatIsAskedForOnceAndKeepsIt) {

@@ -121,7 +121,7 @@ TEST_F(Window, aGraphIsOpenedTunedUndoneSavedAndRunsToTheSamePicture) {
 TEST_F(Window, nodesAreBypassedDisabledGroupedAndCommentedOn) {
     std::string text = kGraph;
     text.replace(text.find("source: head.volume, transfer"), 19, "source: code.bricks");
-    text += "  - id: code\n    type: wavelet.encode\n    in:  { volume: head.volume }\n    at: [220, 0]\n";
+    text += "  - id: code\n    type: wavelet.encode\n    in:  { volume: head.volume }\n    at: [220, -120]\n";
     std::ofstream(graph()) << text;
     VirtualDisplay display(1280, 720);
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
@@ -263,6 +263,12 @@ TEST_F(Window, theHandTurnsThePicture) {
     s = editor.wait_for("the final picture", [](const json& now) { return shows_final(now, "view.image"); });
     EXPECT_NE(s["text"], kGraph);
     EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("elevation:"));
+    editor.move_to("picture", 0.5, 0.45);  // the skull
+    s = editor.wait_for("the voxel under the pointer", [](const json& now) { return !now["picked"].get<std::string>().empty(); });
+    EXPECT_THAT(s["picked"].get<std::string>(), HasSubstr("   value "));
+    keep(editor.screenshot(), "picked");
+    editor.move_to("picture", 0.1, 0.6);  // beside it
+    editor.wait_for("nothing", [](const json& now) { return now["picked"].get<std::string>().empty(); });
     editor.key("z", "ctrl");
     editor.wait_for("undo", [](const json& now) { return now["text"] == kGraph; });
     editor.key("7");
@@ -274,8 +280,15 @@ TEST_F(Window, aPresetIsTurnedIntoPointsThatAreDragged) {
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
     editor.wait_for("a picture", [](const json& now) { return shows_final(now, "view.image"); });
     editor.click("node:tf");
+    json s = editor.with("gradients");
+    const double panel_ends = s["items"]["state"][1];  // where the status bar begins
+    EXPECT_LE(s["items"]["gradients"][3].get<double>(), panel_ends) << "seen without scrolling";
+    EXPECT_LE(s["items"]["transfer:tf"][3].get<double>(), panel_ends);
+    editor.click("gradients");
+    keep(editor.screenshot(), "gradients");
+    editor.click("gradients");
     editor.click("into-points");
-    json s = editor.with("point:tf.4");
+    s = editor.with("point:tf.4");
     EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("preset: none"));
     const std::string before = s["text"];
     editor.move_to("point:tf.4");
@@ -355,6 +368,15 @@ nodes:
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
     editor.wait_for("a picture", [](const json& s) { return shows_final(s, "a-view.image"); });
     editor.key("c");
+    auto share_of_pictures = [](const json& now) {
+        const double top = now["items"]["picture"][1], bottom = now["items"]["picture"][3], all = now["items"]["split:y"][1];
+        return (bottom - top) / (all - top);
+    };
+    const double beside_numbers = share_of_pictures(editor.with("compare-table"));
+    EXPECT_GT(beside_numbers, 0.5);
+    editor.click("numbers");
+    EXPECT_GT(share_of_pictures(editor.wait_for("no numbers", [](const json& s) { return !s["items"].contains("compare-table"); })), beside_numbers + 0.25);
+    editor.key("c", "shift");
     editor.with("compare-table");
     editor.wait_for("two settings", [](const json& s) { return s["tried"] == 2; });
     editor.click("sweep:a");
@@ -441,6 +463,30 @@ TEST_F(Window, aNewcomerComparesTwoCodecsOnTheEngineInFewActions) {
     EXPECT_EQ(s["problems"], 0);
     EXPECT_LE(actions, 25);
     keep(editor.screenshot(), "newcomer-table");
+}
+
+// The example as people first see it; its picture is the one in docs/pictures.
+TEST_F(Window, theExampleOfCodecsIsDrawnAsItStandsInTheDocs) {
+    if (!fs::exists("/usr/share/mricron/templates/ch2.nii.gz")) GTEST_SKIP() << "mricron-data is not installed";
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {VOXLOOM_SOURCE_DIR "/graphs/codecs.yaml", "--size", "1280x720"});
+    auto everything = [](const json& s) {
+        return shows_final(s, "wavelet-view.image") && shows_final(s, "zfp-view.image") && shows_final(s, "errors.table");
+    };
+    editor.wait_for("the first picture", everything);
+    editor.key("c");
+    editor.click("node:tf");
+    editor.move_to("picture:0", 0.5, 0.6);
+    const json s = editor.wait_for("both pictures and a voxel", [&](const json& now) {
+        return everything(now) && !now["picked"].get<std::string>().empty();
+    });
+    EXPECT_EQ(s["problems"], 0);
+    for (const auto& [a, r] : s["items"].items())
+        for (const auto& [b, q] : s["items"].items()) {
+            if (a >= b || !a.starts_with("node:") || !b.starts_with("node:")) continue;
+            EXPECT_TRUE(r[2] <= q[0] || q[2] <= r[0] || r[3] <= q[1] || q[3] <= r[1]) << a << " lies on " << b;
+        }
+    keep(editor.screenshot(), "editor");
 }
 
 TEST_F(Window, everythingIsReadableOnALargeScreen) {

@@ -229,6 +229,7 @@ void Evaluator::collect(const Plan::Node& node, const Hash& key, const ResultCac
     for (std::size_t o = 0; o < result.outputs.size(); ++o) {
         const std::string port = node.id + "." + node.type->outputs[o].key;
         if (auto* volume = std::get_if<VolumePtr>(&result.outputs[o])) state_.volumes[port] = *volume;
+        if (auto* bricks = std::get_if<BricksPtr>(&result.outputs[o])) state_.bricks[port] = *bricks;
         if (is_shown(voxloom::type_of(result.outputs[o]))) show(port, result.outputs[o], fresh);
     }
 }

@@ -62,6 +62,7 @@ class Evaluator final : RunObserver {
         std::map<std::string, NodeStatus> nodes;
         std::map<std::string, LiveValue> values;    // images, tables, cameras and transfer functions, by "node.port"
         std::map<std::string, std::weak_ptr<const Volume>> volumes;  // as long as the cache keeps them
+        std::map<std::string, std::weak_ptr<const Bricks>> bricks;    // as are these
         std::shared_ptr<const Graph> graph;         // that all of this is of
         std::vector<Problem> problems;
         std::vector<std::string> warnings;

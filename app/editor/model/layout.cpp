@@ -55,7 +55,7 @@ double picture_height(const NodePorts& ports) {
     for (const PortSpec& port : ports.outputs) {
         if (!ports.type) continue;
         const PortType type = type_of(port);
-        if (type == PortType::image || type == PortType::volume) height = std::max(height, 96.0);
+        if (type == PortType::image || type == PortType::volume || type == PortType::bricks) height = std::max(height, 96.0);
         if (type == PortType::table) height = std::max(height, 68.0);
         if (type == PortType::transfer) height = std::max(height, 44.0);
     }

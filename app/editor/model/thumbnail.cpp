@@ -105,4 +105,12 @@ std::shared_ptr<const Thumbnail> thumbnail_of(const Volume& volume, const std::s
     return small;
 }
 
+std::shared_ptr<const Thumbnail> thumbnail_of(const BricksPtr& bricks, BrickCache& cache, const std::stop_token& stop) {
+    const std::vector<LevelDesc>& levels = bricks->desc().levels;
+    const Index3 least = glm::min(levels[0].dims, Index3(kThumbnailLevelVoxels));
+    std::size_t level = levels.size() - 1;
+    while (level > 0 && glm::any(glm::lessThan(levels[level].dims, least))) --level;
+    return thumbnail_of(*level_as_volume(bricks, int(level), cache), stop);
+}
+
 }  // namespace voxloom::editor

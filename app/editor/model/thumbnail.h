@@ -6,6 +6,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "core/data/brick_cache.h"
 #include "core/data/image.h"
 #include "core/data/volume.h"
 
@@ -24,6 +25,10 @@ std::shared_ptr<const Thumbnail> thumbnail_of(const Image& image);
 // The middle slice along z, or along the axis that has one voxel, grey from its least to its greatest
 // value, or in colour where the volume is. Rows go down as they are drawn: the last one is at the top.
 std::shared_ptr<const Thumbnail> thumbnail_of(const Volume& volume, const std::stop_token& stop = {});
+// The same of the coarsest level that has at least so many voxels along each axis, or as many as there are; what it
+// needs is decoded through `cache`.
+inline constexpr std::int64_t kThumbnailLevelVoxels = 64;
+std::shared_ptr<const Thumbnail> thumbnail_of(const BricksPtr& bricks, BrickCache& cache, const std::stop_token& stop = {});
 
 // An opaque pixel of a screen, over black. Not a number is black.
 glm::u8vec4 screen_pixel(const glm::vec4& color);

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
     : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
       examples(find_examples()),
-      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), evaluator(nodes, wake) {}
+      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), picks(wake, 2), evaluator(nodes, wake) {}
 
 // --- small things that all regions use -----------------------------------------------------------
 
@@ -298,6 +298,7 @@ void draw_message(Editor& editor) {
 void draw(Editor& editor) {
     editor.marks.clear();
     editor.moving = false;
+    editor.picked.clear();
     editor.evaluator.refresh(editor.live);
     handle_keys(editor);
 
@@ -368,6 +369,11 @@ void draw_status_bar(Editor& editor) {
     }
     text_in(color, state.c_str());
     mark(editor, "state");
+    if (!editor.picked.empty()) {
+        ImGui::SameLine(0, ui(24));
+        text_in(t.text, editor.picked.c_str());
+        mark(editor, "picked");
+    }
     if (!live.problems.empty()) {
         ImGui::SameLine(0, ui(24));
         const std::string problems = fmt::format("{} problem{}", live.problems.size(), live.problems.size() == 1 ? "" : "s");

@@ -18,6 +18,7 @@
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
 #include "app/editor/model/histogram.h"
+#include "app/editor/model/pick.h"
 #include "app/editor/model/settings.h"
 #include "app/editor/model/thumbnail.h"
 #include "app/editor/view/theme.h"
@@ -154,6 +155,7 @@ struct Editor {
     bool quit = false;
     bool theme_changed = false, screenshot_wanted = false, picture_wanted = false;
 
+    std::string picked;         // what the pixel under the pointer shows, for the status line
     std::string message;        // a sentence at the pointer, until message_until
     double message_until = 0;
     bool message_is_error = false;
@@ -182,6 +184,7 @@ struct Editor {
     Background<GradientHistogram> gradients;
     Background<Thumbnail> small_pictures;
     Background<Image> differences;
+    Background<Picked> picks;   // few: the pointer soon is elsewhere
     Evaluator evaluator;        // the last: it ends first
 };
 

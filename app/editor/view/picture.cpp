@@ -103,6 +103,9 @@ SmallPicture* small_picture(Editor& editor, const std::string& node, const NodeP
         } else if (auto found = editor.live.volumes.find(name); found != editor.live.volumes.end()) {
             if (const VolumePtr volume = found->second.lock())
                 made = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); });
+        } else if (auto compressed = editor.live.bricks.find(name); compressed != editor.live.bricks.end()) {
+            if (const BricksPtr bricks = compressed->second.lock())
+                made = editor.small_pictures.find({bricks}, [bricks](const std::stop_token& stop) { return thumbnail_of(bricks, BrickCache::global(), stop); });
         } else {
             continue;
         }

@@ -14,7 +14,7 @@ void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& p
 // False where there is none; the reason is then in `why`.
 bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, std::string& why);
 void delete_textures(Editor& editor);
-// The small picture of what a node gives, where there is one: of its first image or volume.
+// The small picture of what a node gives, where there is one: of its first image, volume or bricks.
 SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports);
 inline ImTextureID texture_of(const Picture& picture) { return reinterpret_cast<ImTextureID>(std::uintptr_t(picture.texture)); }
 

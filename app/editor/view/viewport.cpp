@@ -36,7 +36,8 @@ void draw_port_choice(Editor& editor, std::size_t k, const WireEnd& shown, float
     const std::string name = name_of_port(shown);
     ImGui::PushID(int(k));
     ImGui::SetNextItemWidth(width);
-    if (ImGui::BeginCombo("##port", name.c_str())) {
+    const std::string seen = shortened(name, width - ImGui::GetFrameHeight() - ui(12), theme().body, theme().body->FontSize);
+    if (ImGui::BeginCombo("##port", seen.c_str())) {
         for (const WireEnd& port : ports_to_look_at(editor)) {
             const std::string text = name_of_port(port);
             if (ImGui::Selectable(text.c_str(), text == name)) editor.viewport.pictures[k].port = port;
@@ -188,6 +189,20 @@ std::string why_empty(const Editor& editor, const WireEnd& port) {
     return editor.live.busy ? "Computing…" : "Nothing here yet.";
 }
 
+// For the status line, and until it is known nothing.
+void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& value, const ImagePtr& image, glm::dvec2 at) {
+    const glm::ivec2 pixel(glm::floor(at)), size = image->size();
+    if (!value.fresh || pixel.x < 0 || pixel.y < 0 || pixel.x >= size.x || pixel.y >= size.y) return;
+    std::optional<PickScene> scene = pick_scene(editor.work.graph(), editor.registry, port.node, editor.live);
+    if (!scene) return;
+    const std::string unit = scene->volume->desc().unit;
+    const double number = double(pixel.y) * size.x + pixel.x;
+    const auto picked = editor.picks.find({image, {}, number}, [scene = std::move(*scene), pixel, size](const std::stop_token& stop) {
+        return pick(scene, pixel, size, stop);
+    });
+    if (picked) editor.picked = text_of(*picked, unit);
+}
+
 // A rectangle of the window with the pictures `shown` in it: one, or two over each other.
 struct Cell {
     glm::dvec2 lo, size;
@@ -243,9 +258,10 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     std::string text = view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
                                                      : caption(editor, port, *value, picture->size);
     if (hovered && view.mode != Mode::difference) {
-        const Image& image = *std::get<ImagePtr>(value->value);
-        const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image.size());
-        if (std::string pixel = pixel_text(image, at, camera); !pixel.empty()) text += "   " + pixel;
+        const ImagePtr& image = std::get<ImagePtr>(value->value);
+        const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image->size());
+        if (std::string pixel = pixel_text(*image, at, camera); !pixel.empty()) text += "   " + pixel;
+        ask_what_is_seen(editor, port, *value, image, at);
     }
     draw_caption(cell.lo, cell.size, text, value->fresh);
     list.PopClipRect();

@@ -30,6 +30,7 @@ std::string screen_to_json(const Editor& editor) {
     json["first_picture_seconds"] = editor.live.first_picture_seconds;
     json["run_seconds"] = editor.live.wall_seconds;
     json["message"] = editor.message;
+    json["picked"] = editor.picked;
     json["selected"] = editor.work.selected;
     json["text"] = editor.work.document.text();
     json["shown"] = nlohmann::json::array();
