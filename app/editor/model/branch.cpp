@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <queue>
 #include <set>
 
 #include "app/editor/model/param_values.h"
 #include "app/editor/model/ports.h"
+#include "app/editor/model/upstream.h"
 #include "core/base/error.h"
 #include "core/graph/graph_text.h"
 
@@ -24,18 +24,9 @@ bool makes(const NodeType& type, PortType from, PortType to) {
 // The nearest node upstream of `start`, or itself, for which `fits` holds; empty where there is none.
 template <class F>
 std::string nearest(const Graph& graph, const Registry& registry, const std::string& start, F&& fits) {
-    std::queue<std::string> open;
-    std::set<std::string> seen{start};
-    open.push(start);
-    while (!open.empty()) {
-        const GraphNode* node = graph.find(open.front());
-        open.pop();
-        const NodeType* type = node ? registry.find(node->type) : nullptr;
+    for (const GraphNode* node : upstream(graph, start)) {
+        const NodeType* type = registry.find(node->type);
         if (type && fits(*type)) return node->id;
-        if (!node) continue;
-        for (const GraphInput& input : node->inputs)
-            for (const WireEnd& end : input.from)
-                if (seen.insert(end.node).second) open.push(end.node);
     }
     return {};
 }

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
-#include <queue>
-#include <set>
 
 #include "app/editor/model/param_values.h"
 #include "app/editor/model/ports.h"
+#include "app/editor/model/upstream.h"
 
 namespace voxloom::editor {
 
@@ -83,20 +82,12 @@ void orbit_eye(const Knobs& k, glm::dvec2 degrees) {
 }  // namespace
 
 std::optional<std::string> camera_of(const Graph& graph, const Registry& registry, const std::string& node) {
-    std::queue<std::string> open;
-    std::set<std::string> seen{node};
-    open.push(node);
-    while (!open.empty()) {
-        const GraphNode* here = graph.find(open.front());
-        open.pop();
-        const NodeType* type = here ? registry.find(here->type) : nullptr;
+    for (const GraphNode* here : upstream(graph, node)) {
+        const NodeType* type = registry.find(here->type);
         if (!type) continue;
         const bool gives = std::any_of(type->outputs.begin(), type->outputs.end(),
                                        [](const PortSpec& port) { return type_of(port) == PortType::camera; });
         if (gives && type->find_param("azimuth") && type->find_param("elevation")) return here->id;
-        for (const GraphInput& input : here->inputs)
-            for (const WireEnd& end : input.from)
-                if (seen.insert(end.node).second) open.push(end.node);
     }
     return {};
 }

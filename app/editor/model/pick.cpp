@@ -5,10 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <queue>
-#include <set>
 
 #include "app/editor/model/param_values.h"
+#include "app/editor/model/upstream.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/data/brick_cache.h"
@@ -119,17 +118,9 @@ std::optional<PickScene> pick_scene(const Graph& graph, const Registry& registry
     const NodeType* type = node ? registry.find(node->type) : nullptr;
     if (!type) return {};
     PickScene scene;
-    std::queue<std::string> open;
-    std::set<std::string> seen{id};
-    for (open.push(id); !open.empty(); open.pop()) {
-        const GraphNode* here = graph.find(open.front());
-        if (!here) continue;
+    for (const GraphNode* here : upstream(graph, id))
         for (const GraphInput& input : here->inputs)
-            for (const WireEnd& end : input.from) {
-                gather(scene, end.node + "." + end.port, state);
-                if (seen.insert(end.node).second) open.push(end.node);
-            }
-    }
+            for (const WireEnd& end : input.from) gather(scene, end.node + "." + end.port, state);
     if (!scene.camera || !scene.volume || scene.volume->desc().voxels() == 0) return {};
 
     auto value = [&](const char* key) {

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <queue>
-#include <set>
 
 #include "app/editor/model/param_values.h"
 #include "app/editor/model/ports.h"
+#include "app/editor/model/upstream.h"
 
 namespace voxloom::editor {
 
@@ -30,21 +29,13 @@ void set_vector(Workspace& workspace, const std::string& node, const char* key, 
 }  // namespace
 
 std::optional<std::string> plane_of(const Graph& graph, const Registry& registry, const std::string& start) {
-    std::queue<std::string> open;
-    std::set<std::string> seen{start};
     std::optional<std::string> found;
-    for (open.push(start); !open.empty(); open.pop()) {
-        const GraphNode* node = graph.find(open.front());
-        const NodeType* type = node ? registry.find(node->type) : nullptr;
-        if (!type) continue;
-        if (is_vector(*type, "normal") && is_vector(*type, "origin")) {
-            const bool selects = std::ranges::any_of(type->outputs, [](const PortSpec& port) { return type_of(port) == PortType::selection; });
-            if (selects) return node->id;
-            if (!found) found = node->id;
-        }
-        for (const GraphInput& input : node->inputs)
-            for (const WireEnd& end : input.from)
-                if (seen.insert(end.node).second) open.push(end.node);
+    for (const GraphNode* node : upstream(graph, start)) {
+        const NodeType* type = registry.find(node->type);
+        if (!type || !is_vector(*type, "normal") || !is_vector(*type, "origin")) continue;
+        const bool selects = std::ranges::any_of(type->outputs, [](const PortSpec& port) { return type_of(port) == PortType::selection; });
+        if (selects) return node->id;
+        if (!found) found = node->id;
     }
     return found;
 }
