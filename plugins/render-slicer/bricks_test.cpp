@@ -9,25 +9,14 @@
 #include "core/data/brick_cache.h"
 #include "core/data/dense_pyramid.h"
 #include "core/data/selection.h"
-#include "core/plugin/plugin.h"
+#include "tests/support/linked_plugin.h"
 #include "tests/support/run_node.h"
 #include "tests/support/volumes.h"
-
-extern "C" const voxloom::PluginTable* voxloom_plugin();
 
 using namespace voxloom;
 using namespace voxloom::testing;
 
 namespace {
-
-const Registry& slicer() {
-    static const Registry registry = [] {
-        Registry r;
-        voxloom_plugin()->add_to(r);
-        return r;
-    }();
-    return registry;
-}
 
 TransferPtr transfer(TransferFunction1D one) {
     auto tf = std::make_shared<TransferFunction>();
@@ -47,7 +36,7 @@ NodeRun draw(const Value& source, const SelectionPtr& selection, TransferPtr tf,
     if (selection) inputs["selection"] = {selection};
     inputs["transfer"] = {tf};
     inputs["camera"] = {CameraPtr(std::make_shared<Camera>(camera))};
-    return run_node(slicer(), "slicer.render",
+    return run_node(linked_plugin(), "slicer.render",
                     "{size: [48, 40], background: [0, 0, 0, 0], early_termination: 1" + more + "}", inputs);
 }
 
@@ -401,7 +390,7 @@ TEST(BrickPath, SamplesOnFacesBetweenLevelsAgree) {
                 inputs["selection"] = {SelectionPtr(s)};
                 inputs["transfer"] = {tf};
                 inputs["camera"] = {CameraPtr(camera)};
-                return run_node(slicer(), "slicer.plane", "{size: [80, 80], gpu_memory: " + std::to_string(memory) + "}", inputs).image();
+                return run_node(linked_plugin(), "slicer.plane", "{size: [80, 80], gpu_memory: " + std::to_string(memory) + "}", inputs).image();
             };
             EXPECT_GT(largest_difference(*side(1, false), *side(-1, false)), 0.05);
             EXPECT_LT(largest_difference(*side(1, true), *side(-1, true)), 1e-5) << axis;

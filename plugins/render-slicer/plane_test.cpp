@@ -6,11 +6,9 @@
 
 #include "core/data/dense_pyramid.h"
 #include "core/data/selection.h"
-#include "core/plugin/plugin.h"
+#include "tests/support/linked_plugin.h"
 #include "tests/support/run_node.h"
 #include "tests/support/volumes.h"
-
-extern "C" const voxloom::PluginTable* voxloom_plugin();
 
 using namespace voxloom;
 using namespace voxloom::testing;
@@ -19,17 +17,12 @@ namespace {
 
 NodeRun cut(const BricksPtr& bricks, const SelectionPtr& selection, const Camera& camera, double most,
             const std::string& params) {
-    static const Registry registry = [] {
-        Registry r;
-        voxloom_plugin()->add_to(r);
-        return r;
-    }();
     // Red says the value, and everything is as dense.
     auto tf = std::make_shared<TransferFunction>();
     tf->one = {{{0, Emission(0, 1, 0, 1)}, {most, Emission(1, 1, 0, 1)}}};
     NodeInputs inputs{{"source", {bricks}}, {"transfer", {TransferPtr(tf)}}, {"camera", {CameraPtr(std::make_shared<Camera>(camera))}}};
     if (selection) inputs["selection"] = {selection};
-    return run_node(registry, "slicer.plane", "{size: [48, 40], background: [0, 0, 0, 0], " + params + "}", inputs);
+    return run_node(linked_plugin(), "slicer.plane", "{size: [48, 40], background: [0, 0, 0, 0], " + params + "}", inputs);
 }
 
 Camera camera_over(const VolumeDesc& desc, glm::dvec3 from, Camera::Projection projection) {

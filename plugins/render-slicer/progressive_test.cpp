@@ -9,25 +9,14 @@
 
 #include "core/data/dense_pyramid.h"
 #include "core/data/selection.h"
-#include "core/plugin/plugin.h"
+#include "tests/support/linked_plugin.h"
 #include "tests/support/run_node.h"
 #include "tests/support/volumes.h"
-
-extern "C" const voxloom::PluginTable* voxloom_plugin();
 
 using namespace voxloom;
 using namespace voxloom::testing;
 
 namespace {
-
-const Registry& slicer() {
-    static const Registry registry = [] {
-        Registry r;
-        voxloom_plugin()->add_to(r);
-        return r;
-    }();
-    return registry;
-}
 
 // Bricks of a pyramid that take their time at the finest level.
 class SlowBricks final : public Bricks {
@@ -78,7 +67,7 @@ NodeRun draw(const char* node, const BricksPtr& bricks, const std::string& param
     RunNodeOptions options;
     options.wants_provisional = looking;
     options.stop = stop;
-    const NodeType& type = *slicer().find(node);
+    const NodeType& type = *linked_plugin().find(node);
     return run_node(type, params_from_yaml(type, "{size: [60, 44], background: [0, 0, 0, 0]" + params + "}"), inputs, options);
 }
 

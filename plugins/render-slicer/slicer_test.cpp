@@ -3,25 +3,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/plugin/plugin.h"
+#include "tests/support/linked_plugin.h"
 #include "tests/support/run_node.h"
 #include "tests/support/volumes.h"
-
-extern "C" const voxloom::PluginTable* voxloom_plugin();
 
 using namespace voxloom;
 using namespace voxloom::testing;
 
 namespace {
-
-const Registry& slicer() {
-    static const Registry registry = [] {
-        Registry r;
-        voxloom_plugin()->add_to(r);
-        return r;
-    }();
-    return registry;
-}
 
 TransferPtr transfer(TransferFunction1D one, double reference = 1) {
     TransferFunction tf;
@@ -39,7 +28,7 @@ NodeRun draw(const Value& source, TransferPtr tf, const Camera& camera, const st
     inputs["source"] = {source};
     inputs["transfer"] = {tf};
     inputs["camera"] = {CameraPtr(std::make_shared<Camera>(camera))};
-    return run_node(slicer(), "slicer.render", params, inputs, options);
+    return run_node(linked_plugin(), "slicer.render", params, inputs, options);
 }
 
 VolumePtr ramp(Index3 dims, ScalarType type = ScalarType::f32, glm::dvec3 spacing = glm::dvec3(1)) {

@@ -3,27 +3,17 @@
 
 #include "core/base/error.h"
 #include "core/data/dense_pyramid.h"
-#include "core/plugin/plugin.h"
 #include "plugins/render-reference/tests/scenes.h"
+#include "tests/support/linked_plugin.h"
 #include "tests/support/run_node.h"
-
-extern "C" const voxloom::PluginTable* voxloom_plugin();
 
 namespace voxloom::reference {
 namespace {
 
 using namespace testing;
+using voxloom::testing::linked_plugin;
 using voxloom::testing::NodeInputs;
 using voxloom::testing::run_node;
-
-const Registry& registry() {
-    static const Registry with_node = [] {
-        Registry r;
-        voxloom_plugin()->add_to(r);
-        return r;
-    }();
-    return with_node;
-}
 
 NodeInputs inputs(Value source) {
     return {{"source", {std::move(source)}},
@@ -37,7 +27,7 @@ std::vector<std::byte> bytes(const ImagePtr& image) {
 
 TEST(ReferenceNode, DrawsAPictureOfTheSizeAskedFor) {
     const auto run =
-        run_node(registry(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
+        run_node(linked_plugin(), "reference.raycast", "{size: [20, 10]}", inputs(waves_volume()));
     EXPECT_EQ(run.image()->size(), glm::ivec2(20, 10));
     float brightest = 0;
     for (const glm::vec4& pixel : run.image()->rgba32f()) {
@@ -53,8 +43,8 @@ TEST(ReferenceNode, BricksShowWhatTheirVolumeShows) {
     const VolumePtr volume = waves_volume();
     const BricksPtr bricks = make_dense_pyramid(volume, glm::ivec3(4), PyramidFilter::average);
     for (const char* params : {"{size: [16, 16]}", "{size: [16, 16], shading: true, mode: steps}"})
-        EXPECT_EQ(bytes(run_node(registry(), "reference.raycast", params, inputs(volume)).image()),
-                  bytes(run_node(registry(), "reference.raycast", params, inputs(bricks)).image()));
+        EXPECT_EQ(bytes(run_node(linked_plugin(), "reference.raycast", params, inputs(volume)).image()),
+                  bytes(run_node(linked_plugin(), "reference.raycast", params, inputs(bricks)).image()));
 }
 
 TEST(ReferenceNode, LightsReplaceTheHeadlight) {
@@ -65,8 +55,8 @@ TEST(ReferenceNode, LightsReplaceTheHeadlight) {
     lit["lights"] = {LightsPtr(dark)};
     // Without lights and with full ambient light a shaded picture is the unshaded one.
     const auto shaded =
-        run_node(registry(), "reference.raycast", "{size: [16, 16], shading: true}", lit).image();
-    const auto plain = run_node(registry(), "reference.raycast", "{size: [16, 16]}", lit).image();
+        run_node(linked_plugin(), "reference.raycast", "{size: [16, 16], shading: true}", lit).image();
+    const auto plain = run_node(linked_plugin(), "reference.raycast", "{size: [16, 16]}", lit).image();
     for (int y = 0; y < 16; ++y)
         for (int x = 0; x < 16; ++x)
             EXPECT_LT(glm::length(shaded->at(x, y) - plain->at(x, y)), 1e-6f);
@@ -75,7 +65,7 @@ TEST(ReferenceNode, LightsReplaceTheHeadlight) {
 TEST(ReferenceNode, WrongCombinationsAreNamedBeforeAnythingIsDrawn) {
     auto message = [](const std::string& params) -> std::string {
         try {
-            run_node(registry(), "reference.raycast", params, inputs(waves_volume()));
+            run_node(linked_plugin(), "reference.raycast", params, inputs(waves_volume()));
         } catch (const Error& e) {
             return e.what();
         }
