@@ -36,15 +36,10 @@ void clamp_integers(const From* from, std::size_t count, To* to) {
 // Calls with(T()) where the type is one of integers; false where it is not.
 template <class With>
 bool with_integer(ScalarType type, const With& with) {
-    switch (type) {
-        case ScalarType::u8: with(std::uint8_t{}); return true;
-        case ScalarType::i8: with(std::int8_t{}); return true;
-        case ScalarType::u16: with(std::uint16_t{}); return true;
-        case ScalarType::i16: with(std::int16_t{}); return true;
-        case ScalarType::u32: with(std::uint32_t{}); return true;
-        case ScalarType::i32: with(std::int32_t{}); return true;
-        default: return false;
-    }
+    with_type(type, [&](auto t) {
+        if constexpr (std::is_integral_v<decltype(t)>) with(t);
+    });
+    return !is_float(type);
 }
 
 // Calls with(From(), To()) where both types are of integers; false where one is not.

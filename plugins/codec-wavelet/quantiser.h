@@ -14,7 +14,7 @@ struct Quantiser {
     double centre_one = 0, centre_more = 0;
 };
 
-// Where the quantiser rounds: |c| / step below `first` gives 0, and what is left up by `up`. A wide dead
+// Where the quantiser rounds: |c| / step below kDeadZone gives 0, else the integer part of it and kRoundUp. A wide dead
 // zone costs little error, since small coefficients are many, and saves most of their bits.
 inline constexpr double kDeadZone = 0.75, kRoundUp = 0.3;
 // A number that stands nearly alone in its block costs ten bits or so, more than the error it saves:
