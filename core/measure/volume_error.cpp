@@ -191,6 +191,10 @@ std::optional<double> nominal_peak(const VolumeDesc& desc) {
     return std::ldexp(1.0, bits) - 1;
 }
 
+Index3 tile_of_bricks(glm::ivec3 brick) {
+    return Index3(brick) * glm::max(Index3(64) / Index3(brick), Index3(1));
+}
+
 std::string problem_with_comparison(const VolumeDesc& volume, const VolumeDesc& reference) {
     if (volume.dims != reference.dims)
         return fmt::format("the volume has {} x {} x {} voxels and the reference {} x {} x {}; they "

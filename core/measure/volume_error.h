@@ -52,6 +52,9 @@ struct CompareOptions {
 VolumeError compare_volumes(const VolumePtr& volume, const VolumePtr& reference,
                             const CompareOptions& options = {});
 
+// Tiles for volumes that are read from bricks of this size: whole bricks, so that none is decoded for two of them.
+Index3 tile_of_bricks(glm::ivec3 brick);
+
 // Why the two cannot be compared, or empty.
 std::string problem_with_comparison(const VolumeDesc& volume, const VolumeDesc& reference);
 

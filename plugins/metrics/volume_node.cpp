@@ -34,12 +34,9 @@ VolumePtr as_volume(const Value& value) {
     return level_as_volume(std::get<BricksPtr>(value), 0, BrickCache::global());
 }
 
-// Tiles of whole bricks, so that no brick is decoded for two tiles.
 Index3 tile_for(const Value& value) {
     auto* bricks = std::get_if<BricksPtr>(&value);
-    if (!bricks) return Index3(0);
-    const Index3 brick((*bricks)->desc().brick);
-    return brick * glm::max(Index3(64) / brick, Index3(1));
+    return bricks ? tile_of_bricks((*bricks)->desc().brick) : Index3(0);
 }
 
 bool same_place(const VolumeDesc& a, const VolumeDesc& b) {

@@ -6,6 +6,9 @@
 #include "app/editor/model/branch.h"
 #include "app/editor/model/plane_control.h"
 #include "core/base/error.h"
+#include "core/data/dense_pyramid.h"
+#include "core/graph/check.h"
+#include "tests/support/volumes.h"
 
 namespace voxloom::editor {
 namespace {
@@ -101,13 +104,113 @@ TEST_F(Branches, numbersAreThoseThatWereMeasuredAndNoOthers) {
     EXPECT_FALSE(n.psnr);
 }
 
+TEST_F(Branches, measuresOfTheEditorStandInForNodesThatAreNotThere) {
+    const Branch b = branch("view");
+    EXPECT_EQ(b.bricks.node + "." + b.bricks.port, "code.bricks");
+    EXPECT_EQ(b.original.node + "." + b.original.port, "ct.volume");
+    EXPECT_EQ(branch("direct").bricks.node, "");
+    auto decoded = std::make_shared<Decoded>();
+    decoded->ratio = 5, decoded->bits_per_voxel = 1.6, decoded->cpu_seconds = 2, decoded->bytes_per_second = 1e8;
+    decoded->psnr = 39, decoded->max_error = 4;
+    auto image = std::make_shared<ImageError>();
+    image->rmse = 0.125, image->max_error = 0.5;
+    OwnMeasures own;
+    own.decoded = decoded, own.image = image;
+    finish("code", 1, {{"psnr", {40, "dB"}}});
+    finish("back", 0.25);
+    BranchNumbers n = numbers_of(b, state, own);
+    EXPECT_EQ(n.ratio, 5);
+    EXPECT_EQ(n.bits_per_voxel, 1.6);
+    EXPECT_EQ(n.psnr, 39) << "all of it was decoded: what the codec says may be of less";
+    EXPECT_EQ(n.max_error, 4);
+    EXPECT_EQ(n.decode, 2);
+    EXPECT_EQ(n.decoded_bytes_per_second, 1e8);
+    EXPECT_EQ(n.image_rmse, 0.125);
+    EXPECT_EQ(n.image_max, 0.5);
+    table("wrong", "psnr", 41);
+    table("unlike", "rmse", 0.01);
+    n = numbers_of(b, state, own);
+    EXPECT_EQ(n.psnr, 41);
+    EXPECT_EQ(n.image_rmse, 0.01);
+    own.image_first = true;
+    EXPECT_EQ(numbers_of(b, state, own).image_rmse, 0.125);
+    decoded->problem = "corrupt";
+    n = numbers_of(b, state, own);
+    EXPECT_FALSE(n.ratio);
+    EXPECT_EQ(n.decode, 0.25);
+}
+
+TEST_F(Branches, areDrawnWithoutTheirCodecByCopiesThatPassItBy) {
+    const std::vector<GraphNode> nodes_without = nodes_without_codec(document.graph(), nodes, branch("view"));
+    ASSERT_EQ(nodes_without.size(), 3u);
+    Graph graph = document.graph();
+    graph.nodes.insert(graph.nodes.end(), nodes_without.begin(), nodes_without.end());
+    const Plan plan = check(graph, nodes);
+    EXPECT_TRUE(plan.problems.empty());
+    const Plan::Node& view = plan.nodes[std::size_t(plan.find(id_without_codec("view")))];
+    EXPECT_TRUE(view.ok);
+    EXPECT_EQ(plan.nodes[std::size_t(view.inputs.at(0).at(0).node)].id, "ct");
+    EXPECT_TRUE(is_without_codec(id_without_codec("view")));
+    EXPECT_THROW(document.add_node(id_without_codec("view"), "test.draw"), Error) << "no node of a document has such a name";
+    EXPECT_TRUE(nodes_without_codec(document.graph(), nodes, branch("direct")).empty());
+}
+
+// --- decoding ------------------------------------------------------------------------------------
+
+VolumePtr wave(double plus, Index3 dims = {37, 21, 9}) {
+    return voxloom::testing::make_volume(dims, ScalarType::i16, [plus](auto x, auto y, auto z) { return plus + double(x + 2 * y + 3 * z); });
+}
+
+TEST(Decoding, measuresWhatAConstantErrorIs) {
+    const BricksPtr bricks = make_dense_pyramid(wave(3), glm::ivec3(8), PyramidFilter::average);
+    const auto d = decode_all(bricks, wave(0));
+    EXPECT_EQ(d->problem, "");
+    EXPECT_EQ(d->max_error, 3);
+    EXPECT_NEAR(*d->psnr, 20 * std::log10((36 + 40 + 24) / 3.0), 1e-9);
+    const double voxels = 37 * 21 * 9, bytes = double(bricks->desc().compressed_bytes);
+    EXPECT_DOUBLE_EQ(d->ratio, 2 * voxels / bytes);
+    EXPECT_DOUBLE_EQ(d->bits_per_voxel, 8 * bytes / voxels);
+    EXPECT_GT(d->cpu_seconds, 0);
+    EXPECT_DOUBLE_EQ(d->bytes_per_second, 2 * voxels / d->cpu_seconds);
+    const auto same = decode_all(bricks, bricks);
+    EXPECT_EQ(same->max_error, 0);
+    EXPECT_EQ(*same->psnr, INFINITY);
+    for (const Value& other : {Value(), Value(wave(0, {36, 21, 9}))}) {
+        const auto alone = decode_all(bricks, other);
+        EXPECT_EQ(alone->problem, "");
+        EXPECT_FALSE(alone->psnr);
+        EXPECT_GT(alone->cpu_seconds, 0);
+    }
+    EXPECT_EQ(decode_all(make_dense_pyramid(wave(0, {1, 7, 1}), glm::ivec3(8), PyramidFilter::average), wave(0, {1, 7, 1}))->max_error, 0);
+}
+
+TEST(Decoding, saysWhatIsWrongWithTheBricks) {
+    struct Torn final : Bricks {
+        using Bricks::Bricks;
+        BrickInfo info(BrickId) const override { return {}; }
+        std::optional<BrickId> parent(BrickId) const override { return {}; }
+        std::vector<DecodedBrick> refine(BrickId, const BrickVoxels*, const std::stop_token&) const override { fail("the brick is torn"); }
+    };
+    BricksDesc desc;
+    desc.volume = wave(0)->desc();
+    desc.brick = glm::ivec3(16);
+    desc.tree_type = desc.volume.type;
+    desc.levels = pyramid_levels(desc.volume, desc.brick, true);
+    const auto torn = std::make_shared<const Torn>(desc);
+    EXPECT_NE(decode_all(torn, Value())->problem.find("torn"), std::string::npos);
+    EXPECT_NE(decode_all(torn, wave(0))->problem.find("torn"), std::string::npos);
+    std::stop_source stop;
+    stop.request_stop();
+    EXPECT_THROW(decode_all(torn, wave(0), stop.get_token()), Cancelled);
+}
+
 TEST_F(Branches, whatWasTriedIsKeptOnceAndComesBackInOneStep) {
     std::vector<Tried> tried;
-    collect_tried(tried, {branch("view"), branch("direct")}, state);
+    collect_tried(tried, {branch("view"), branch("direct")}, {}, state);
     EXPECT_TRUE(tried.empty());
     finish("code", 1, {{"psnr", {40, "dB"}}});
-    collect_tried(tried, {branch("view")}, state);
-    collect_tried(tried, {branch("view")}, state);
+    collect_tried(tried, {branch("view")}, {}, state);
+    collect_tried(tried, {branch("view")}, {}, state);
     ASSERT_EQ(tried.size(), 1u);
     EXPECT_EQ(tried[0].seconds, 1);
     document.set_param("code", "steps", std::int64_t(5));
@@ -119,9 +222,11 @@ TEST_F(Branches, whatWasTriedIsKeptOnceAndComesBackInOneStep) {
     EXPECT_EQ(document.text(), before);
     document.remove_node("code");
     EXPECT_THROW(bring_back(document, tried[0], nodes), Error);
+    Branch only;
+    only.codec = "code";
     for (int i = 0; i < 600; ++i) {
         finish("code", 2 + i, {{"psnr", {INFINITY, "dB"}}});
-        collect_tried(tried, {{{}, "code", {}, {}, {}}}, state);
+        collect_tried(tried, {only}, {}, state);
     }
     EXPECT_EQ(tried.size(), 500u);
     EXPECT_EQ(tried.back().seconds, 601);

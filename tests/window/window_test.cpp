@@ -481,12 +481,33 @@ TEST_F(Window, theExampleOfCodecsIsDrawnAsItStandsInTheDocs) {
         return everything(now) && !now["picked"].get<std::string>().empty();
     });
     EXPECT_EQ(s["problems"], 0);
+    auto measured = [](const json& now) {
+        return now["numbers"].size() == 2 && std::ranges::all_of(now["numbers"], [](const json& n) { return n.size() == 9; });
+    };
+    const json numbers = editor.wait_for("every number of both", measured)["numbers"];
+    EXPECT_EQ(numbers[0]["image_rmse"], 0) << "it is the reference";
+    EXPECT_GT(numbers[1]["image_rmse"], 0);
+    for (const json& n : numbers) {
+        EXPECT_LE(n["max_error"], 8) << "as the graph asks for";
+        for (const char* time : {"encode", "decode", "frame"}) EXPECT_GT(n[time], 0) << time;
+    }
     for (const auto& [a, r] : s["items"].items())
         for (const auto& [b, q] : s["items"].items()) {
             if (a >= b || !a.starts_with("node:") || !b.starts_with("node:")) continue;
             EXPECT_TRUE(r[2] <= q[0] || q[2] <= r[0] || r[3] <= q[1] || q[3] <= r[1]) << a << " lies on " << b;
         }
     keep(editor.screenshot(), "editor");
+    editor.click("reference:1");
+    editor.wait_for("the other reference", [](const json& now) { return now["numbers"][1]["image_rmse"] == 0 && now["numbers"][0].value("image_rmse", 0.0) > 0; });
+    editor.click("against");
+    keep(editor.screenshot(), "against");
+    editor.click("against:uncompressed");
+    const json without = editor.wait_for("both against the volume itself", [](const json& now) {
+        return std::ranges::all_of(now["numbers"], [](const json& n) { return n.value("image_rmse", 0.0) > 0; });
+    });
+    EXPECT_EQ(without["problems"], 0);
+    EXPECT_EQ(without["text"], s["text"]) << "the graph stays as it is";
+    keep(editor.screenshot(), "uncompressed");
 }
 
 TEST_F(Window, everythingIsReadableOnALargeScreen) {

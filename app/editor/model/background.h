@@ -44,7 +44,8 @@ class Background {
     Background& operator=(const Background&) = delete;
 
     // The thing, or null until it is made, which asking begins: what is asked for last is made first. Null
-    // for ever where `make` throws: what it is made of has said what is wrong with it.
+    // for ever where `make` throws: what it is made of has said what is wrong with it. Without `make` nothing
+    // begins, and what is there is found.
     Result find(const MadeOf& of, Make make) {
         std::lock_guard lock(mutex_);
         for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
@@ -52,6 +53,7 @@ class Background {
             entries_.splice(entries_.begin(), entries_, entry);
             return entry->result;
         }
+        if (!make) return nullptr;
         entries_.push_front({of, std::move(make), nullptr});
         if (entries_.size() > most_kept_) entries_.pop_back();
         wake_.notify_all();

@@ -31,6 +31,23 @@ std::string nearest(const Graph& graph, const Registry& registry, const std::str
     return {};
 }
 
+std::string output_of(const NodeType& type, PortType wanted) {
+    for (const PortSpec& port : type.outputs)
+        if (type_of(port) == wanted) return port.key;
+    return {};
+}
+
+// What is wired to the node's first input that takes a volume and cannot do without it.
+WireEnd source_of(const GraphNode& node, const NodeType& type) {
+    for (const PortSpec& port : type.inputs)
+        if (!port.optional && port.types.has(PortType::volume))
+            for (const GraphInput& input : node.inputs)
+                if (input.port == port.key && !input.from.empty()) return input.from.front();
+    return {};
+}
+
+std::string name_of_port(const WireEnd& end) { return end.node + "." + end.port; }
+
 // A node with a table whose input `port` gets what one of these nodes gives.
 std::string measuring(const Graph& graph, const Registry& registry, std::string_view port, const std::set<std::string>& sources) {
     for (const GraphNode& node : graph.nodes) {
@@ -90,31 +107,81 @@ Branch branch_of(const Graph& graph, const Registry& registry, const WireEnd& pi
     if (!b.codec.empty()) {
         b.decoder = nearest(graph, registry, picture.node, [](const NodeType& type) { return makes(type, PortType::bricks, PortType::volume); });
         b.volume_error = measuring(graph, registry, "volume", {b.codec, b.decoder});
+        b.original = source_of(*graph.find(b.codec), *registry.find(graph.find(b.codec)->type));
     }
+    const std::string coded = !b.codec.empty() ? b.codec : nearest(graph, registry, picture.node, [](const NodeType& type) {
+        return !output_of(type, PortType::bricks).empty();
+    });
+    if (!coded.empty()) b.bricks = {coded, output_of(*registry.find(graph.find(coded)->type), PortType::bricks), {}};
     b.image_error = measuring(graph, registry, "image", {picture.node});
     return b;
 }
 
-BranchNumbers numbers_of(const Branch& b, const Evaluator::State& state) {
+BranchNumbers numbers_of(const Branch& b, const Evaluator::State& state, const OwnMeasures& own) {
     BranchNumbers n;
-    n.ratio = measured(state, b.codec, "ratio");
-    n.bits_per_voxel = measured(state, b.codec, "bits per voxel");
-    n.psnr = first_of(tabled(state, b.volume_error, "psnr"), measured(state, b.codec, "psnr"));
-    n.max_error = first_of(tabled(state, b.volume_error, "max_error"), measured(state, b.codec, "max error"));
+    const Decoded* decoded = own.decoded && own.decoded->problem.empty() ? own.decoded.get() : nullptr;
+    auto known = [](double v) { return v > 0 ? std::optional(v) : std::nullopt; };
+    n.ratio = first_of(measured(state, b.codec, "ratio"), decoded ? known(decoded->ratio) : std::nullopt);
+    n.bits_per_voxel = first_of(measured(state, b.codec, "bits per voxel"), decoded ? known(decoded->bits_per_voxel) : std::nullopt);
+    n.psnr = first_of(first_of(tabled(state, b.volume_error, "psnr"), decoded ? decoded->psnr : std::nullopt), measured(state, b.codec, "psnr"));
+    n.max_error = first_of(first_of(tabled(state, b.volume_error, "max_error"), decoded ? decoded->max_error : std::nullopt), measured(state, b.codec, "max error"));
     n.image_rmse = tabled(state, b.image_error, "rmse");
+    n.image_max = tabled(state, b.image_error, "max_error");
+    if (own.image && (own.image_first || !n.image_rmse)) n.image_rmse = own.image->rmse, n.image_max = own.image->max_error;
     n.encode = first_of(measured(state, b.codec, "codec time"), wall(state, b.codec));
-    n.decode = wall(state, b.decoder);
+    n.decode = decoded ? std::optional(decoded->cpu_seconds) : wall(state, b.decoder);
+    if (decoded) n.decoded_bytes_per_second = decoded->bytes_per_second;
     n.frame = wall(state, b.picture.node);
     return n;
 }
 
-void collect_tried(std::vector<Tried>& tried, const std::vector<Branch>& branches, const Evaluator::State& state) {
-    for (const Branch& branch : branches) {
+Compared compared_of(const Branch& b, const Evaluator::State& state) {
+    Compared compared;
+    if (!finished(state, b.bricks.node)) return compared;
+    auto bricks_at = [&](const WireEnd& end) {
+        auto found = state.bricks.find(name_of_port(end));
+        return found == state.bricks.end() ? BricksPtr() : found->second.lock();
+    };
+    compared.bricks = bricks_at(b.bricks);
+    if (b.original.node.empty()) return compared;
+    auto volume = state.volumes.find(name_of_port(b.original));
+    if (VolumePtr original = volume == state.volumes.end() ? nullptr : volume->second.lock()) compared.original = original;
+    else if (BricksPtr others = bricks_at(b.original)) compared.original = others;
+    return compared;
+}
+
+std::string id_without_codec(const std::string& id) { return id + "~"; }
+bool is_without_codec(std::string_view id) { return id.ends_with('~'); }
+
+std::vector<GraphNode> nodes_without_codec(const Graph& graph, const Registry& registry, const Branch& branch) {
+    std::vector<GraphNode> nodes;
+    if (branch.codec.empty()) return nodes;
+    std::set<std::string> copied;
+    for (const GraphNode* node : upstream(graph, branch.picture.node)) {
+        const std::vector<const GraphNode*> before = upstream(graph, node->id);
+        if (std::ranges::any_of(before, [&](const GraphNode* n) { return n->id == branch.codec; })) copied.insert(node->id);
+    }
+    for (const std::string& id : copied) {
+        GraphNode& node = nodes.emplace_back(*graph.find(id));
+        const NodeType* type = registry.find(node.type);
+        const bool decodes = type && makes(*type, PortType::bricks, PortType::volume);
+        if (id == branch.codec || decodes) node.use = GraphNode::Use::bypassed;
+        node.id = id_without_codec(id);
+        for (GraphInput& input : node.inputs)
+            for (WireEnd& end : input.from)
+                if (copied.count(end.node)) end.node = id_without_codec(end.node);
+    }
+    return nodes;
+}
+
+void collect_tried(std::vector<Tried>& tried, const std::vector<Branch>& branches, const std::vector<OwnMeasures>& own, const Evaluator::State& state) {
+    for (std::size_t i = 0; i < branches.size(); ++i) {
+        const Branch& branch = branches[i];
         const NodeStatus* status = finished(state, branch.codec);
         const GraphNode* node = state.graph ? state.graph->find(branch.codec) : nullptr;
         if (!status || !node) continue;
         const bool known = std::ranges::any_of(tried, [&](const Tried& t) { return t.codec == branch.codec && t.key == status->key; });
-        const BranchNumbers numbers = numbers_of(branch, state);
+        const BranchNumbers numbers = numbers_of(branch, state, i < own.size() ? own[i] : OwnMeasures{});
         if (known || !numbers.encode || !numbers.psnr || std::isnan(*numbers.psnr)) continue;
         if (tried.size() >= kMostTried) tried.erase(tried.begin());
         tried.push_back({branch.codec, status->key, node->params, *numbers.encode, *numbers.psnr});

@@ -132,15 +132,21 @@ void Evaluator::loop() {
     for (;;) {
         wake_.wait(lock, [&] { return ending_ || (next_ && !(running_coarse_ && next_->coarse)); });
         if (ending_) return;
-        const Request request = std::move(*next_);
+        Request request = std::move(*next_);
         next_.reset();
         planning_ = true;
         cancelled_ = false;
         lock.unlock();
 
-        Plan plan = check(request.graph, registry_);
+        Graph graph = request.graph;
+        graph.nodes.insert(graph.nodes.end(), request.extra.begin(), request.extra.end());
+        Plan plan = check(graph, registry_);
+        auto is_extra = [&](const Problem& problem) {
+            return std::ranges::any_of(request.extra, [&](const GraphNode& node) { return node.id == problem.node; });
+        };
+        std::erase_if(plan.problems, is_extra);
         publish(plan, request);
-        if (request.coarse) plan = check(request.graph, registry_, {coarse_overrides(plan), {}, 0});
+        if (request.coarse) plan = check(graph, registry_, {coarse_overrides(plan), {}, 0});
         RunOptions options;
         options.wanted = wanted_of(plan, request);
         options.output_folder = request.output_folder;

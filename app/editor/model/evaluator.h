@@ -47,6 +47,9 @@ class Evaluator final : RunObserver {
   public:
     struct Request {
         Graph graph;
+        // Nodes of the interface's own, beside those of the graph. What is wrong with them is theirs: it is no
+        // problem of the graph.
+        std::vector<GraphNode> extra;
         // Outputs that are looked at, beside those that the graph asks for.
         std::vector<WireEnd> watched;
         // Something is moving: only what is watched is computed, with pictures a third the size.

@@ -1,5 +1,5 @@
-// Below compared pictures: what each of their branches costs and how wrong it is, and a plot of all the
-// settings that were tried, to go back to any of them.
+// Below compared pictures: the numbers of their branches, and a plot of all the settings that were tried, to go
+// back to any of them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,15 +7,11 @@
 #include <set>
 
 #include "app/editor/view/actions.h"
-#include "app/editor/view/editor.h"
+#include "app/editor/view/compare_strip.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
 
 namespace voxloom::editor {
-
-namespace {
-
-constexpr double kText = 12, kLine = 13, kNames = 92, kColumn = 84, kButtons = 26, kRows = 9;
 
 ImU32 color_of_branch(std::size_t k) {
     const Theme& t = theme();
@@ -24,31 +20,13 @@ ImU32 color_of_branch(std::size_t k) {
 }
 
 void say_at(ImVec2 at, ImU32 color, const std::string& text, double width) {
-    const std::string cut = shortened(text, ui(width), theme().body, ui(kText));
-    ImGui::GetWindowDrawList()->AddText(theme().body, ui(kText), at, color, cut.c_str());
+    const std::string cut = shortened(text, ui(width), theme().body, ui(kStripText));
+    ImGui::GetWindowDrawList()->AddText(theme().body, ui(kStripText), at, color, cut.c_str());
 }
 
-std::string number(std::optional<double> v) { return v ? fmt::format("{:.4g}", *v) : "–"; }
-std::string seconds(std::optional<double> v) { return v ? human_seconds(*v) : "–"; }
+namespace {
 
-void draw_numbers(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo) {
-    static const char* const names[] = {"ratio", "bits per voxel", "PSNR, dB", "max error", "image RMSE", "encode", "decode", "frame"};
-    auto row_at = [&](std::size_t row) { return lo.y + ui(kLine * double(row)); };
-    for (std::size_t r = 0; r < std::size(names); ++r) say_at({lo.x, row_at(r + 1)}, theme().muted, names[r], kNames - 6);
-    for (std::size_t k = 0; k < branches.size(); ++k) {
-        const BranchNumbers n = numbers_of(branches[k], editor.live);
-        const std::string texts[] = {number(n.ratio), number(n.bits_per_voxel), number(n.psnr), number(n.max_error),
-                                     number(n.image_rmse), seconds(n.encode), seconds(n.decode), seconds(n.frame)};
-        const float x = lo.x + ui(kNames + kColumn * double(k));
-        say_at({x, lo.y}, color_of_branch(k), branches[k].picture.node, kColumn - 6);
-        for (std::size_t r = 0; r < std::size(texts); ++r) say_at({x, row_at(r + 1)}, theme().text, texts[r], kColumn - 6);
-    }
-    const ImVec2 hi{lo.x + ui(kNames + kColumn * double(branches.size())), row_at(std::size(names) + 1)};
-    mark(editor, "compare-table", lo, hi);
-    if (ImGui::IsMouseHoveringRect(lo, hi))
-        ImGui::SetTooltip("Encode: the codec's own time where it tells it, else its node's. Decode and frame: their nodes'.\n"
-                          "–: nothing in the graph measures it; metrics.volume, metrics.image and bricks.decode do.");
-}
+constexpr double kText = kStripText, kLine = kStripLine, kButtons = 26;
 
 // Time against error, over the range of what was tried.
 struct Plot {
@@ -100,7 +78,7 @@ void draw_tried(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo, 
     say_at({plot.lo.x, plot.hi.y + ui(3)}, t.muted, editor.tried.empty() ? "time" : human_seconds(std::pow(10, plot.t0)), 60);
     const float width = t.body->CalcTextSizeA(ui(kText), FLT_MAX, 0, right.c_str()).x;
     say_at({plot.hi.x - width, plot.hi.y + ui(3)}, t.muted, right, 60);
-    say_at({plot.lo.x + ui(6), plot.hi.y - ui(kText + 4)}, faded(t.muted, 0.8f), "PSNR, dB, against encode time", double(plot.hi.x - plot.lo.x) / double(t.scale) - 10);
+    say_at({plot.lo.x + ui(6), plot.hi.y - ui(kText + 4)}, faded(t.muted, 0.8f), "dB, encode time", double(plot.hi.x - plot.lo.x) / double(t.scale) - 10);
 
     ImGui::SetCursorScreenPos(lo);
     const bool clicked = ImGui::InvisibleButton("tried", {std::max(hi.x - lo.x, 1.f), std::max(hi.y - lo.y, 1.f)});
@@ -131,6 +109,10 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at
     mark(editor, "numbers");
     tooltip(fmt::format("{}  ({})", numbers.doc, key_text(numbers)));
     ImGui::SameLine();
+    if (editor.viewport.numbers) {
+        draw_against(editor);
+        ImGui::SameLine();
+    }
     if (editor.sweep) {
         const std::string text = fmt::format("Stop, {} of {}", std::min(editor.sweep->next, editor.sweep->values.size()), editor.sweep->values.size());
         if (ImGui::SmallButton(text.c_str())) editor.sweep.reset();
@@ -153,19 +135,10 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at
 
 }  // namespace
 
-// Found anew where the graph or what is looked at is another one.
-void update_branches(Editor& editor) {
-    auto same = [](const Branch& branch, const WireEnd& port) { return branch.picture.node == port.node && branch.picture.port == port.port; };
-    if (editor.branches_text == editor.work.document.text() && std::ranges::equal(editor.branches, editor.watched, same)) return;
-    editor.branches_text = editor.work.document.text();
-    editor.branches.clear();
-    for (const WireEnd& port : editor.watched) editor.branches.push_back(branch_of(editor.work.graph(), editor.registry, port));
-}
-
 double compare_strip_height(const Editor& editor, double room) {
     if (editor.viewport.mode == Viewport::Mode::single) return 0;
     // The pictures keep more than half of the height.
-    const double buttons = double(ui(kButtons)), all = buttons + double(ui(kRows * kLine + 6));
+    const double buttons = double(ui(kButtons)), all = buttons + double(ui(kNumberRows * kLine + 6));
     return editor.viewport.numbers && room > 2 * all ? all : room > 4 * buttons ? buttons : 0;
 }
 
@@ -175,8 +148,8 @@ void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size) {
     draw_buttons(editor, branches, im(lo + glm::dvec2(ui(8), ui(3))));
     if (size.y < double(ui(kButtons + kLine))) return;
     const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(kButtons));
-    draw_numbers(editor, branches, im(table));
-    const double left = lo.x + double(ui(kNames + kColumn * double(branches.size()) + 16));
+    draw_numbers(editor, im(table));
+    const double left = lo.x + double(ui(numbers_width(branches.size()) + 16));
     if (left + double(ui(110)) > lo.x + size.x) return;  // no room for a plot
     draw_tried(editor, branches, {float(left), float(table.y)}, {float(lo.x + size.x - ui(8)), float(lo.y + size.y - ui(6))});
 }

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
     : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
       examples(find_examples()),
-      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), picks(wake, 2), evaluator(nodes, wake) {}
+      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), decoded(wake), image_errors(wake), picks(wake, 2), evaluator(nodes, wake) {}
 
 // --- small things that all regions use -----------------------------------------------------------
 
@@ -62,6 +62,7 @@ void begin_document(Editor& editor, Workspace work) {
     editor.tried.clear();
     editor.sweep.reset();
     for (Picture& picture : editor.viewport.pictures) picture.port = {};
+    editor.viewport.against = Viewport::Against::first;
     editor.viewport.zoom = 0;
     editor.start_page = false;
     fit_canvas(editor);
@@ -187,6 +188,15 @@ void submit(Editor& editor, const Graph& graph, bool coarse, bool write) {
     Evaluator::Request request;
     request.graph = graph;
     request.watched = editor.watched;
+    if (!coarse) {
+        for (const WireEnd& reference : editor.references)
+            if (!contains(request.watched, reference)) request.watched.push_back(reference);
+        for (std::size_t k = 0; k < editor.references.size(); ++k) {
+            if (!is_without_codec(editor.references[k].node)) continue;
+            for (GraphNode& node : nodes_without_codec(graph, editor.registry, branch_of(graph, editor.registry, editor.watched[k])))
+                if (std::ranges::none_of(request.extra, [&](const GraphNode& n) { return n.id == node.id; })) request.extra.push_back(std::move(node));
+        }
+    }
     request.coarse = coarse;
     request.write = write;
     request.output_folder = editor.output_folder;
@@ -216,7 +226,7 @@ void go_on_with_sweep(Editor& editor) {
 void submit_changes(Editor& editor) {
     if (editor.viewport.mode != Viewport::Mode::single) {
         update_branches(editor);
-        collect_tried(editor.tried, editor.branches, editor.live);
+        collect_tried(editor.tried, editor.branches, editor.measures, editor.live);
     }
     if (editor.sweep) {
         go_on_with_sweep(editor);
@@ -224,8 +234,9 @@ void submit_changes(Editor& editor) {
         editor.ever_submitted = false;
     }
     std::vector<WireEnd> shown = shown_ports(editor);
-    const bool others = !std::equal(shown.begin(), shown.end(), editor.watched.begin(), editor.watched.end(), same_end);
-    if (others) editor.watched = std::move(shown);
+    std::vector<WireEnd> references = references_of(editor, shown);
+    const bool others = !std::ranges::equal(shown, editor.watched, same_end) || !std::ranges::equal(references, editor.references, same_end);
+    if (others) editor.watched = std::move(shown), editor.references = std::move(references);
     bool changed = !editor.ever_submitted || others;
     if (!changed && editor.submitted_text != editor.work.document.text()) {
         changed = !same_results(editor.submitted, editor.work.graph());
@@ -360,7 +371,7 @@ void draw_status_bar(Editor& editor) {
         color = t.accent;
         for (const auto& [id, status] : live.nodes)
             if (status.state == NodeState::running) {
-                state = "Running " + id;
+                state = is_without_codec(id) ? "Running the reference" : "Running " + id;
                 if (status.fraction >= 0) state += fmt::format("  {:.0f} %", 100 * status.fraction);
                 if (status.seconds_left >= 0) state += ", " + human_seconds(status.seconds_left) + " left";
             }

@@ -85,6 +85,10 @@ struct Viewport {
     std::array<Picture, 4> pictures;
     Difference difference;
     enum class Handle { none, move, turn } held = Handle::none;  // of the cutting plane
+    // What errors of compared pictures are measured against: the first picture; one that was chosen, by a node that
+    // makes it; or of each picture the one without its codec.
+    enum class Against { first, port, uncompressed } against = Against::first;
+    WireEnd reference;
     double wipe = 0.5;         // share of the width that shows the first picture
     bool numbers = true;       // shown below compared pictures
     double zoom = 0;           // screen pixels a picture pixel; 0: fitted
@@ -161,6 +165,8 @@ struct Editor {
     bool message_is_error = false;
 
     std::vector<Branch> branches;  // of what is looked at
+    std::vector<WireEnd> references;        // of each of them: the picture that it is measured against
+    std::vector<OwnMeasures> measures;      // of each of them
     std::string branches_text;     // of the document that they were found in
     std::vector<Tried> tried;   // settings of codecs that were looked at, oldest first
     std::optional<Sweep> sweep; // in progress: evaluates other graphs than the document
@@ -184,6 +190,8 @@ struct Editor {
     Background<GradientHistogram> gradients;
     Background<Thumbnail> small_pictures;
     Background<Image> differences;
+    Background<Decoded> decoded;
+    Background<ImageError> image_errors;
     Background<Picked> picks;   // few: the pointer soon is elsewhere
     Evaluator evaluator;        // the last: it ends first
 };
@@ -226,7 +234,10 @@ void draw_canvas(Editor& editor);
 void draw_add_menu(Editor& editor);
 void draw_note_editor(Editor& editor);
 void draw_viewport(Editor& editor);
+// Of what is looked at: branches, and what the editor measures of them.
 void update_branches(Editor& editor);
+// For each of the pictures; empty where nobody sees the numbers.
+std::vector<WireEnd> references_of(const Editor& editor, const std::vector<WireEnd>& pictures);
 double compare_strip_height(const Editor& editor, double room);  // 0: there is none
 void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size);
 void draw_parameters(Editor& editor);

@@ -14,6 +14,19 @@
 
 namespace voxloom::editor {
 
+namespace {
+
+// Without what nobody has measured.
+nlohmann::json numbers_to_json(const BranchNumbers& n) {
+    nlohmann::json json = nlohmann::json::object();
+    for (auto [name, value] : {std::pair("ratio", n.ratio), {"bits_per_voxel", n.bits_per_voxel}, {"psnr", n.psnr}, {"max_error", n.max_error},
+                               {"image_rmse", n.image_rmse}, {"image_max", n.image_max}, {"encode", n.encode}, {"decode", n.decode}, {"frame", n.frame}})
+        if (value) json[name] = *value;
+    return json;
+}
+
+}  // namespace
+
 std::string screen_to_json(const Editor& editor) {
     nlohmann::json json;
     json["frame"] = ImGui::GetFrameCount();
@@ -35,6 +48,8 @@ std::string screen_to_json(const Editor& editor) {
     json["text"] = editor.work.document.text();
     json["shown"] = nlohmann::json::array();
     for (const WireEnd& end : editor.watched) json["shown"].push_back(end.node + "." + end.port);
+    json["numbers"] = nlohmann::json::array();
+    for (std::size_t k = 0; k < editor.measures.size(); ++k) json["numbers"].push_back(numbers_to_json(numbers_of(editor.branches[k], editor.live, editor.measures[k])));
     json["tried"] = editor.tried.size();
     json["sweeping"] = editor.sweep.has_value();
     json["problems"] = editor.live.problems.size();
