@@ -130,6 +130,100 @@ TEST(Pick, findsTheGreatestValueOfARay) {
     EXPECT_EQ(picked->values, std::vector<double>{-5});
 }
 
+// A ray along y through the middle of a box, in whole voxels.
+PickScene scene_along_y(VolumePtr volume) {
+    PickScene scene = scene_of(std::move(volume), looking({0, -100, 0}, Camera::Projection::orthographic));
+    auto camera = *scene.camera;
+    camera.target = {4, 0, 4}, camera.eye = {4, -100, 4}, camera.up = {0, 0, 1}, camera.height = 9;
+    scene.camera = std::make_shared<const Camera>(camera);
+    return scene;
+}
+
+std::optional<std::int64_t> y_seen(const PickScene& scene) {
+    const auto picked = pick(scene, {4, 4}, {9, 9});
+    return picked ? std::optional(picked->voxel.y) : std::nullopt;
+}
+
+TEST(Pick, ofAnXRayIsWhereMostIsAbsorbed) {
+    // Thin in front, a dense layer, the densest one behind it, thin again.
+    PickScene scene = scene_along_y(make_volume({9, 50, 9}, ScalarType::u8, [](auto, auto y, auto) { return y == 20 ? 200 : y == 33 || y == 40 ? 240 : 110; }));
+    scene.how = PickScene::How::densest;
+    auto ramp = std::make_shared<TransferFunction>();
+    ramp->one.points = {{100, Emission(0)}, {250, Emission(3)}};
+    scene.transfer = ramp;
+    EXPECT_EQ(y_seen(scene), 33);
+    scene.how = PickScene::How::opacity;
+    EXPECT_LE(y_seen(scene).value(), 1) << "what hides is thick enough at once";
+    auto peak = std::make_shared<TransferFunction>();
+    peak->one.points = {{190, Emission(0)}, {200, Emission(9)}, {210, Emission(0)}};
+    scene.how = PickScene::How::densest, scene.transfer = peak;
+    EXPECT_EQ(y_seen(scene), 20);
+    peak = std::make_shared<TransferFunction>();
+    peak->one.points = {{0, Emission(0)}};
+    scene.transfer = peak;
+    EXPECT_EQ(y_seen(scene), std::nullopt) << "nothing is absorbed";
+}
+
+TEST(Pick, readsTransferFunctionsOverGradients) {
+    PickScene scene = scene_along_y(make_volume({9, 50, 9}, ScalarType::u8, [](auto, auto y, auto) { return y < 30 ? 100 : 200; }));
+    auto two = std::make_shared<TransferFunction2D>();
+    two->value = {0, 255}, two->gradient = {0, 100}, two->dims = {2, 3};
+    two->samples = {Emission(0), Emission(0), Emission(50), Emission(50), Emission(50), Emission(50)};  // from 50 on, in half
+    auto transfer = std::make_shared<TransferFunction>();
+    transfer->two = two;
+    scene.transfer = transfer;
+    EXPECT_EQ(y_seen(scene), 29) << "the first of two voxels beside the step: half of 100 is its gradient";
+    two = std::make_shared<TransferFunction2D>(*two);
+    two->samples = {Emission(0), Emission(0), Emission(0), Emission(0), Emission(50), Emission(50)};
+    transfer = std::make_shared<TransferFunction>();
+    transfer->two = two;
+    scene.transfer = transfer;
+    EXPECT_EQ(y_seen(scene), std::nullopt) << "no gradient is so steep";
+    scene.how = PickScene::How::densest;
+    EXPECT_EQ(y_seen(scene), std::nullopt);
+}
+
+// All stencils are exact for a ramp, also in a skew and stretched lattice; one-sided at a border they give half.
+TEST(Pick, modulatesOpacityByTheGradientInTheWorld) {
+    VolumeDesc desc = make_volume({9, 50, 9}, ScalarType::f32, [](auto x, auto y, auto z) { return 150 + double(x) + 2 * double(y) - 3 * double(z); })->desc();
+    const VolumePtr ramp = make_volume({9, 50, 9}, ScalarType::f32, [](auto x, auto y, auto z) { return 150 + double(x) + 2 * double(y) - 3 * double(z); });
+    desc.index_to_world = glm::dmat4(glm::dmat3(1, 0.25, 0, 0, 2, 0, 0, 0, 4));
+    Buffer voxels(desc.dense_bytes());
+    ramp->read(Box::of(desc.dims), voxels.bytes());
+    PickScene scene = scene_of(std::make_shared<const DenseVolume>(desc, std::move(voxels)), looking({0, -200, 0}, Camera::Projection::orthographic));
+    auto camera = *scene.camera;
+    camera.target = {4, 50, 16}, camera.eye = {4, -100, 16}, camera.up = {0, 0, 1}, camera.height = 9;
+    scene.camera = std::make_shared<const Camera>(camera);
+    // v = x + 2 y - 3 z of indices; world x = i, y = i/4 + 2 j, z = 4 k: dv = (1 - 1/4) dX + dY - 3/4 dZ.
+    const double slope = glm::length(glm::dvec3(0.75, 1, -0.75));
+    for (double smoothing : {0.0, 0.25, 1.0 / 6}) {
+        scene.smoothing = smoothing;
+        scene.modulation = glm::dvec2(slope * 1.0001);
+        EXPECT_EQ(y_seen(scene), std::nullopt);
+        scene.modulation = glm::dvec2(slope * 0.9999);
+        EXPECT_EQ(y_seen(scene), 1) << "behind the border, where gradients are half";
+        scene.modulation = {0, slope * 0.1};
+        EXPECT_EQ(y_seen(scene), 0);
+    }
+}
+
+TEST(Pick, takesTheOpacityOfColoursFromTheirAlpha) {
+    VolumeDesc desc = make_volume({9, 50, 9}, ScalarType::u8, [](auto...) { return 0; })->desc();
+    desc.components = 4, desc.color = true;
+    Buffer voxels(desc.dense_bytes());
+    for (std::size_t i = 0; i < desc.voxels(); ++i) {
+        const std::size_t y = i / 9 % 50;
+        for (std::size_t c = 0; c < 4; ++c) voxels.as<std::uint8_t>()[4 * i + c] = std::uint8_t(c < 3 ? 150 + c : y < 17 ? 0 : 255);
+    }
+    PickScene scene = scene_along_y(std::make_shared<const DenseVolume>(desc, std::move(voxels)));
+    const auto picked = pick(scene, {4, 4}, {9, 9});
+    ASSERT_NE(picked, nullptr);
+    EXPECT_EQ(picked->voxel, Index3(4, 17, 4));
+    EXPECT_EQ(picked->values, (std::vector<double>{150, 151, 152, 255}));
+    scene.transfer = step_at_100(0);
+    EXPECT_EQ(y_seen(scene), std::nullopt) << "the transfer function of their luma counts, too";
+}
+
 TEST(Pick, meetsAPlaneOfAnyVolumeAndNothingBesideIt) {
     const auto pairs = [] {
         VolumeDesc desc = make_volume({20, 10, 5}, ScalarType::u8, [](auto...) { return 0; })->desc();
@@ -184,7 +278,8 @@ NodeType drawing(const char* id, bool plane) {
     type.outputs = {{"image", PortType::image, "The picture."}};
     if (plane) type.params = {param::vector("normal", {0, 0, 1}, "Normal."), param::vector("origin", {0.5, 0.5, 0.5}, "Point.")};
     else type.params = {param::choice("compositing", {"emission-absorption", "mip", "x-ray", "isosurface"}, "emission-absorption", "How."),
-                        param::real("iso_value", 7, "Value."), param::integer("component", 0, "Component.")};
+                        param::real("iso_value", 7, "Value."), param::vector("gradient_modulation", {0, 0}, "Gradients."),
+                        param::choice("gradient", {"central", "sobel", "isotropic"}, "isotropic", "Stencil."), param::integer("component", 0, "Component.")};
     type.evaluate = [](Evaluation&) {};
     return type;
 }
@@ -216,7 +311,12 @@ TEST(PickScene, isMadeOfWhatIsNearestUpstream) {
     EXPECT_EQ(scene("a").value().how, PickScene::How::isosurface);
     EXPECT_EQ(scene("a").value().iso_value, 7);
     document.set_param("a", "compositing", std::string("x-ray"));
-    EXPECT_FALSE(scene("a"));
+    EXPECT_EQ(scene("a").value().how, PickScene::How::densest);
+    EXPECT_EQ(scene("a").value().modulation, glm::dvec2(0));
+    document.set_param("a", "gradient_modulation", std::vector<double>{1, 4});
+    document.set_param("a", "gradient", std::string("sobel"));
+    EXPECT_EQ(scene("a").value().modulation, glm::dvec2(1, 4));
+    EXPECT_EQ(scene("a").value().smoothing, 0.25);
     document.reset_param("a", "compositing");
     document.set_param("a", "component", std::int64_t(1));
     EXPECT_FALSE(scene("a"));

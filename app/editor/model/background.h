@@ -54,6 +54,8 @@ class Background {
             return entry->result;
         }
         if (!make) return nullptr;
+        // What is made of something that is gone will not be asked for again.
+        std::erase_if(entries_, [](const Entry& entry) { return !entry.make && entry.of.a.expired(); });
         entries_.push_front({of, std::move(make), nullptr});
         if (entries_.size() > most_kept_) entries_.pop_back();
         wake_.notify_all();

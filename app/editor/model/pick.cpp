@@ -32,34 +32,90 @@ void gather(PickScene& scene, const std::string& port, const Evaluator::State& s
 class Voxels {
   public:
     Voxels(const PickScene& scene, const std::stop_token& stop)
-        : volume_(scene.volume->reads_by_region() ? scene.volume : in_memory(scene.volume, stop)),
-          component_(scene.component), bytes_(volume_->desc().voxel_bytes()) {}
+        : scene_(scene), desc_(scene.volume->desc()), stop_(stop),
+          alpha_scale_(is_float(desc_.type) ? 1 : 1 / limits_of(desc_.type).second),
+          gradient_to_world_(glm::transpose(glm::inverse(glm::dmat3(desc_.index_to_world)))) {}
 
-    const std::vector<double>& at(Index3 voxel, const std::stop_token& stop) {
-        if (voxel == at_ && !values_.empty()) return values_;
-        const VolumeDesc& desc = volume_->desc();
-        const Box box{voxel, voxel + Index3(1)};
-        volume_->read(box, bytes_.bytes(), stop);
-        values_.clear();
-        with_type(desc.type, [&](auto t) {
-            for (auto v : bytes_.as<decltype(t)>()) values_.push_back(double(v));
-        });
-        std::uint8_t valid = 1;
-        if (desc.has_mask) volume_->read_mask(box, {&valid, 1});
-        classified_ = valid ? values_[std::size_t(component_)] : std::numeric_limits<double>::quiet_NaN();
-        at_ = voxel;
+    // Its components.
+    const std::vector<double>& values(Index3 voxel) {
+        read({voxel, voxel + Index3(1)});
         return values_;
     }
-    // Of the voxel read last; NaN where it is not valid.
-    double classified() const { return classified_; }
+    // What is classified; NaN where the voxel is not valid.
+    double scalar(Index3 voxel) {
+        read({voxel, voxel + Index3(1)});
+        return scalar_of(0);
+    }
+    // Extinction as renderers have it at the voxel.
+    double extinction(Index3 voxel) {
+        const TransferFunction& transfer = *scene_.transfer;
+        const double v = scalar(voxel);
+        if (!(transfer.max_extinction(v, v) > 0)) return 0;
+        const double alpha = desc_.color && desc_.components == 4 ? std::clamp(values_[3] * alpha_scale_, 0.0, 1.0) : 1;
+        const bool modulated = scene_.modulation != glm::dvec2(0);
+        const double slope = transfer.two || modulated ? glm::length(gradient(voxel)) : 0;
+        double e = alpha * (transfer.two ? transfer.two->at(v, slope) : transfer.one.at(v)).a;
+        if (modulated) e *= shown_of(slope);
+        return e > 0 ? e : 0;
+    }
 
   private:
-    VolumePtr volume_;
-    int component_;
+    void read(const Box& box) {
+        if (box == box_) return;
+        box_ = {};
+        const auto count = std::size_t(box.voxels());
+        if (bytes_.size() != count * desc_.voxel_bytes()) bytes_ = Buffer(count * desc_.voxel_bytes(), "voxels");
+        scene_.volume->read(box, bytes_.bytes(), stop_);
+        values_.clear();
+        with_type(desc_.type, [&](auto t) {
+            for (auto v : bytes_.as<decltype(t)>()) values_.push_back(double(v));
+        });
+        valid_.assign(count, 1);
+        if (desc_.has_mask) scene_.volume->read_mask(box, valid_);
+        box_ = box;
+    }
+    double scalar_of(std::size_t k) const {
+        const double* v = &values_[k * std::size_t(desc_.components)];
+        const double s = desc_.color ? 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2] : v[scene_.component];
+        return valid_[k] && std::isfinite(s) ? s : std::numeric_limits<double>::quiet_NaN();
+    }
+    // The renderers' stencil: a difference along one axis, smoothed along the other two. Beside the volume values are
+    // those of its border, and a voxel that is not valid is as the one in the middle.
+    glm::dvec3 gradient(Index3 voxel) {
+        const Box box{glm::max(voxel - Index3(1), Index3(0)), glm::min(voxel + Index3(2), desc_.dims)};
+        read(box);
+        const Index3 n = box.dims();
+        auto value_at = [&](Index3 at) {
+            at = glm::clamp(at, box.lo, box.hi - Index3(1)) - box.lo;
+            return scalar_of(std::size_t((at.z * n.y + at.y) * n.x + at.x));
+        };
+        const double middle = value_at(voxel), side = scene_.smoothing;
+        glm::dvec3 g(0);
+        for (int z = -1; z <= 1; ++z)
+            for (int y = -1; y <= 1; ++y)
+                for (int x = -1; x <= 1; ++x) {
+                    const glm::dvec3 o(x, y, z), w = glm::mix(glm::dvec3(1 - 2 * side), glm::dvec3(side), glm::abs(o));
+                    if (const double v = value_at(voxel + Index3(x, y, z)); !std::isnan(v))
+                        g += 0.5 * (v - middle) * o * glm::dvec3(w.y * w.z, w.x * w.z, w.x * w.y);
+                }
+        return gradient_to_world_ * g;
+    }
+    double shown_of(double slope) const {
+        const double lo = scene_.modulation.x, hi = scene_.modulation.y;
+        if (hi <= lo) return slope < lo ? 0 : 1;
+        const double t = std::clamp((slope - lo) / (hi - lo), 0.0, 1.0);
+        return t * t * (3 - 2 * t);
+    }
+
+    const PickScene& scene_;
+    const VolumeDesc& desc_;
+    const std::stop_token& stop_;
+    const double alpha_scale_;
+    const glm::dmat3 gradient_to_world_;
+    Box box_;  // that was read last
     Buffer bytes_;
-    Index3 at_{0};
     std::vector<double> values_;
-    double classified_ = 0;
+    std::vector<std::uint8_t> valid_;
 };
 
 // The part of a ray, in world lengths from its origin, that lies in the volume and before the camera.
@@ -81,34 +137,42 @@ std::optional<Part> part_in(const SamplingBox& box, glm::dvec3 origin, glm::dvec
     return part;
 }
 
-// Where along the ray, or a negative number. `value_at` is called with rising distances.
+// The first place along the ray where `value_at` is greatest, or a negative number where it is never above `nothing`.
 template <class F>
-double distance_seen(const PickScene& scene, Part part, double step, F&& value_at) {
-    const double nothing = -1;
-    const double steps = std::floor((part.to - part.from) / step);  // at most four for each voxel of a diagonal
-    if (!(steps >= 0 && steps < 1e9)) return nothing;
+double greatest(Part part, double step, std::int64_t steps, double nothing, F&& value_at) {
+    double where = -1;
+    for (std::int64_t i = 0; i <= steps; ++i)
+        if (const double t = part.from + double(i) * step, v = value_at(t); v > nothing) nothing = v, where = t;
+    return where;
+}
+
+// Where along the ray what is seen is met, or a negative number.
+template <class F>
+double distance_seen(const PickScene& scene, Part part, double step, Voxels& voxels, F&& voxel_at) {
+    const double nowhere = -1, steps = std::floor((part.to - part.from) / step);  // at most four for each voxel of a diagonal
+    if (!(steps >= 0 && steps < 1e9)) return nowhere;
     const auto n = std::int64_t(steps);
-    auto place = [&](std::int64_t i) { return part.from + double(i) * step; };
-    if (scene.how == PickScene::How::maximum) {
-        double best = -std::numeric_limits<double>::infinity(), where = nothing;
-        for (std::int64_t i = 0; i <= n; ++i)
-            if (const double v = value_at(place(i)); v > best) best = v, where = place(i);
-        return where;
+    auto scalar_at = [&](double t) { return voxels.scalar(voxel_at(t)); };
+    auto extinction_at = [&](double t) { return voxels.extinction(voxel_at(t)); };
+    switch (scene.how) {
+        case PickScene::How::plane: break;
+        case PickScene::How::maximum: return greatest(part, step, n, -std::numeric_limits<double>::infinity(), scalar_at);
+        case PickScene::How::densest: return greatest(part, step, n, 0, extinction_at);
+        case PickScene::How::isosurface: {
+            const bool beyond = scalar_at(part.from) >= scene.iso_value;
+            for (std::int64_t i = 1; i <= n; ++i)
+                if (const double t = part.from + double(i) * step, v = scalar_at(t); !std::isnan(v) && (v >= scene.iso_value) != beyond) return t;
+            break;
+        }
+        case PickScene::How::opacity: {
+            const double wanted = extinction_of(kVisible, 1);  // the optical depth that hides so much
+            double depth = 0;
+            for (std::int64_t i = 0; i <= n; ++i)
+                if (const double t = part.from + double(i) * step; (depth += step * extinction_at(t)) >= wanted) return t;
+            break;
+        }
     }
-    if (scene.how == PickScene::How::isosurface) {
-        const double first = value_at(part.from);
-        for (std::int64_t i = 1; i <= n; ++i)
-            if (const double v = value_at(place(i)); (v >= scene.iso_value) != (first >= scene.iso_value) && !std::isnan(v)) return place(i);
-        return nothing;
-    }
-    const double wanted = extinction_of(kVisible, 1);  // the optical depth that hides so much
-    double depth = 0;
-    for (std::int64_t i = 0; i <= n; ++i) {
-        const double here = step * scene.transfer->one.at(value_at(place(i))).a;
-        depth += here > 0 ? here : 0;
-        if (depth >= wanted) return place(i);
-    }
-    return nothing;
+    return nowhere;
 }
 
 }  // namespace
@@ -128,18 +192,22 @@ std::optional<PickScene> pick_scene(const Graph& graph, const Registry& registry
         return spec ? value_of(*node, *spec) : ParamValue(false);
     };
     const ParamValue component = value("component"), compositing = value("compositing"), iso = value("iso_value");
+    const ParamValue modulation = value("gradient_modulation"), stencil = value("gradient");
     if (auto* i = std::get_if<std::int64_t>(&component)) scene.component = int(*i);
     if (auto* d = std::get_if<double>(&iso)) scene.iso_value = *d;
-    if (scene.component < 0 || scene.component >= scene.volume->desc().components) return {};
+    if (auto* m = std::get_if<std::vector<double>>(&modulation); m && m->size() == 2) scene.modulation = {(*m)[0], (*m)[1]};
+    if (auto* name = std::get_if<std::string>(&stencil)) scene.smoothing = *name == "central" ? 0 : *name == "sobel" ? 0.25 : 1.0 / 6;
+    if (!scene.volume->desc().color && (scene.component < 0 || scene.component >= scene.volume->desc().components)) return {};
     const auto* how = std::get_if<std::string>(&compositing);
     if (how && *how == "mip") scene.how = PickScene::How::maximum;
     else if (how && *how == "isosurface") scene.how = PickScene::How::isosurface;
+    else if (how && *how == "x-ray") scene.how = PickScene::How::densest;
     else if (how && *how != "emission-absorption") return {};
     if (type->find_param("normal") && type->find_param("origin"))
         if (const auto plane = plane_of(graph, registry, id)) scene.plane = plane_now(graph, registry, *plane, state);
     if (scene.plane) scene.how = PickScene::How::plane;
-    else if (scene.volume->desc().color) return {};
-    if (scene.how == PickScene::How::opacity && (!scene.transfer || scene.transfer->two)) return {};
+    const bool classified = scene.how == PickScene::How::opacity || scene.how == PickScene::How::densest;
+    if (classified && !scene.transfer) return {};
     return scene;
 }
 
@@ -162,15 +230,14 @@ std::shared_ptr<const Picked> pick(const PickScene& scene, glm::ivec2 pixel, glm
     } else {
         // Half a voxel along the axis along which voxels come fastest.
         const double step = 0.5 / std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
-        t = distance_seen(scene, *part, step, [&](double at) {
+        t = distance_seen(scene, *part, step, voxels, [&](double at) {
             check_stop(stop);
-            voxels.at(voxel_at(at), stop);
-            return voxels.classified();
+            return voxel_at(at);
         });
         if (t < 0) return nullptr;
     }
     const Index3 voxel = voxel_at(t);
-    return std::make_shared<const Picked>(Picked{ray.origin + t * ray.direction, voxel, voxels.at(voxel, stop)});
+    return std::make_shared<const Picked>(Picked{ray.origin + t * ray.direction, voxel, voxels.values(voxel)});
 }
 
 std::string text_of(const Picked& p, const std::string& unit) {

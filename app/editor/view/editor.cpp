@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
     : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
       examples(find_examples()),
-      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), decoded(wake), image_errors(wake), picks(wake, 2), evaluator(nodes, wake) {}
+      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), decoded(wake), image_errors(wake), loaded(wake, 1), picks(wake, 2), evaluator(nodes, wake) {}
 
 // --- small things that all regions use -----------------------------------------------------------
 

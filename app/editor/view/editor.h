@@ -192,6 +192,7 @@ struct Editor {
     Background<Image> differences;
     Background<Decoded> decoded;
     Background<ImageError> image_errors;
+    Background<Volume> loaded;  // to be picked from
     Background<Picked> picks;   // few: the pointer soon is elsewhere
     Evaluator evaluator;        // the last: it ends first
 };

@@ -195,6 +195,11 @@ void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& valu
     if (!value.fresh || pixel.x < 0 || pixel.y < 0 || pixel.x >= size.x || pixel.y >= size.y) return;
     std::optional<PickScene> scene = pick_scene(editor.work.graph(), editor.registry, port.node, editor.live);
     if (!scene) return;
+    // What cannot be read by region is loaded once, as long as it is the same.
+    if (const VolumePtr volume = scene->volume; !volume->reads_by_region()) {
+        scene->volume = editor.loaded.find({volume}, [volume](const std::stop_token& stop) { return in_memory(volume, stop); });
+        if (!scene->volume) return;
+    }
     const std::string unit = scene->volume->desc().unit;
     const double number = double(pixel.y) * size.x + pixel.x;
     const auto picked = editor.picks.find({image, {}, number}, [scene = std::move(*scene), pixel, size](const std::stop_token& stop) {
