@@ -103,9 +103,12 @@ GLenum TexelLayout::format() const {
     return formats[channels - 1];
 }
 
-TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity) {
+TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity, bool between) {
     TexelLayout l;
-    l.wide = bytes_of(desc.type) > 2;
+    // Steps of a texel from one integer to the next.
+    const double steps = between ? std::floor(65535 / std::clamp(range.extent(), 1.0, 65535.0)) : 1;
+    const bool precise = !between || desc.color || steps * std::max(range.extent(), 1.0) >= 50000;
+    l.wide = bytes_of(desc.type) > 2 || !precise;
     l.validity = validity && !desc.color;
     l.from = desc.color ? 0 : component;
     l.channels = desc.color ? 4 : l.validity ? 2 : 1;
@@ -117,6 +120,9 @@ TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range
         l.scale = range.max > range.min ? range.max - range.min : 1.0;
         if (!std::isfinite(l.scale))
             fail("the values of this volume span more than a double can hold");
+    } else if (between) {
+        l.offset = range.min;
+        l.scale = 65535 / steps;
     } else {
         // Every integer has its own texel: 8-bit values times 257; signed ones from the smallest on, as
         // small texels are interpolated with small absolute error.

@@ -71,8 +71,9 @@ struct TexelLayout {
 };
 // `range` is that of the values, used where the type alone does not say. Throws Error where it is more
 // than a double can hold. Colours have no room for validity: invalid voxels are black and, where there
-// is an alpha, transparent.
-TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity);
+// is an alpha, transparent. `between`: values between two integers are kept too, within 1e-5 of the range, which all
+// of them must lie in.
+TexelLayout texel_layout(const VolumeDesc& desc, int component, ValueRange range, bool validity, bool between = false);
 // Voxels [begin, end) of a dense array of desc.type to texels; mask may be null. True when one of them
 // is not finite.
 bool to_texels(const std::byte* voxels, const std::uint8_t* mask, const VolumeDesc& desc,

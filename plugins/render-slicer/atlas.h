@@ -10,25 +10,15 @@
 #pragma once
 
 #include <list>
+#include <functional>
+#include <optional>
 #include <stop_token>
 #include <unordered_map>
 #include <vector>
 
-#include "core/data/brick_cache.h"
-#include "core/data/transfer_function.h"
-#include "core/gpu/source.h"
+#include "plugins/render-slicer/brick_texels.h"
 
 namespace voxloom::slicer {
-
-// What is kept of a voxel.
-struct Texels {
-    gpu::TexelLayout layout;               // of its value
-    std::optional<double> gradient_side;   // a gradient too, smoothed so; see Gradients
-    float gradient_scale = 1;              // of its unit, per step of the brick's level
-    TransferPtr transfer;                  // colour and optical depth too, where not null ...
-    double slab = 1;                       // ... of a slab so thick
-    std::uint64_t bytes() const { return layout.bytes() + (gradient_side ? 8 : 0) + (transfer ? 16 : 0); }
-};
 
 // Where in the texture bricks go.
 struct Places {
@@ -60,10 +50,11 @@ class Atlas {
     };
     // Makes all of `wanted` (distinct, at most slots()) resident, through the cache of decoded bricks.
     // progress(fraction) comes now and then.
-    Counters load(const BricksPtr& bricks, const std::vector<BrickId>& wanted, const std::stop_token& stop,
+    Counters load(const BricksPtr& bricks, const std::vector<WantedBrick>& wanted, const std::stop_token& stop,
                   const std::function<void(double)>& progress);
 
-    bool has(BrickId id) const { return index_.contains(id); }
+    bool has(const WantedBrick& brick) const;  // with this mixture
+    bool blends(BrickId id) const;             // is resident with its parent mixed in, so it shows values not its own
     std::int64_t slots() const { return places_.slots; }
     const Places& places() const { return places_; }
     const gpu::TexturePtr& values() const { return values_; }
@@ -82,21 +73,20 @@ class Atlas {
     // Cells on the sides of the blocks that ranges are kept of.
     glm::ivec3 block() const { return block_; }
 
-    static constexpr int kReach = 3;
-
   private:
     struct Brick {
-        BrickId id;
+        WantedBrick wanted;
         std::int64_t slot = 0;
         std::uint64_t picture = 0;       // that wanted it last
+        bool spoilt = false;             // voxels on its faces are a neighbour's mixture
         std::vector<glm::vec2> ranges;   // of its blocks, x fastest
     };
     using Place = std::list<Brick>::iterator;
-    struct Staging;
     glm::ivec3 corner_of(const Brick& brick) const;
     void begin_level(const Bricks& bricks, int level);
-    void fill(const BricksPtr& bricks, Brick& brick, Staging& staging, std::size_t at, bool& invalid,
-              const std::stop_token& stop) const;
+    bool keep(const WantedBrick& brick);
+    bool find_slot(std::int64_t& slot);
+    void spoil_neighbours(BrickId id);
 
     Texels texels_;
     Apron apron_;

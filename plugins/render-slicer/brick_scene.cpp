@@ -49,21 +49,26 @@ int steps_of(const BricksDesc& desc, const std::vector<Page>& pages) {
 // The atlas that has room for `wanted`; made anew where it is too small or its texels lack validity.
 std::shared_ptr<Atlas> atlas_for(const BrickPlan& plan, const BrickRequest& request, bool validity) {
     const BricksPtr& bricks = plan.bricks;
-    const std::vector<BrickId>& wanted = plan.wanted;
+    const std::vector<WantedBrick>& wanted = plan.wanted;
     const ValueRange range = plan.range;
     const BricksDesc& desc = bricks->desc();
     const auto need = std::int64_t(wanted.size());
     std::int64_t all = 0;
     int finest = int(desc.levels.size()) - 1;
     for (const LevelDesc& l : desc.levels) all += std::int64_t(l.bricks.x) * l.bricks.y * l.bricks.z;
-    for (const BrickId& id : wanted) finest = std::min(finest, id.level);
+    bool mixed = false;
+    for (const WantedBrick& brick : wanted) {
+        finest = std::min(finest, brick.id.level);
+        mixed = mixed || brick.blends();
+    }
     const std::uint64_t tables = request.table_bytes * std::uint64_t(steps_of(desc, plan.pages)) + table_bytes(desc, plan.grid);
     const std::uint64_t most_bytes = request.gpu_bytes - std::min(request.gpu_bytes, std::max(tables, request.gpu_bytes / 8));
     validity = validity || desc.volume.has_mask;
     bool whole = true;
     for (;;) {
         Texels texels;
-        texels.layout = gpu::texel_layout(desc.volume, request.component, range, validity);
+        texels.mixed = mixed;
+        texels.layout = gpu::texel_layout(desc.volume, request.component, range, validity, mixed);
         texels.gradient_side = request.gradient_side;
         // No difference of two values, halved, is more than half their range.
         texels.gradient_scale = float(std::max(0.5 * range.extent() / texels.layout.scale, 1e-30));
@@ -93,7 +98,7 @@ std::shared_ptr<Atlas> atlas_for(const BrickPlan& plan, const BrickRequest& requ
                              .value(apron.below).value(apron.above)
                              .value(request.gradient_side.value_or(-1))
                              .hash(request.transfer ? hash_of(*request.transfer) : Hash{}).value(request.slab)
-                             .value(whole ? places->first_level : -1).finish();
+                             .value(whole ? places->first_level : -1).value(mixed).finish();
         auto make = [&](std::uint64_t& bytes) {
             const glm::u64vec3 n(places->dims);
             Keep::instance().make_room(n.x * n.y * n.z * texels.bytes());
@@ -127,12 +132,17 @@ std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
     std::unordered_map<BrickId, bool, HashOfBrickId> known;
     auto is_there = [&](BrickId id) {
         const auto [it, is_new] = known.try_emplace(id, false);
-        if (is_new) it->second = plan.atlas->has(id) || is_decoded(*plan.bricks, id, Atlas::kReach);
+        if (is_new) it->second = plan.atlas->has({id}) || is_decoded(*plan.bricks, id, kReach);
         return it->second;
+    };
+    auto is_mixed = [&](const WantedBrick& brick) {
+        return plan.atlas->has(brick) || (is_decoded(*plan.bricks, brick.id, kReach) &&
+                                          is_decoded(*plan.bricks, *plan.bricks->desc().coarser(brick.id), kReach));
     };
     std::vector<Page> pages = plan.pages;
     for (Page& p : pages) {
-        if (is_there(p.brick) && (!p.parent || is_there(*p.parent))) continue;
+        const WantedBrick brick{p.brick, p.blend};
+        if (p.parent ? is_there(p.brick) && is_there(*p.parent) : brick.blends() ? is_mixed(brick) : is_there(p.brick)) continue;
         p.parent.reset();
         p.blend = {};
         while (!is_there(p.brick))
@@ -144,7 +154,7 @@ std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
     return pages;
 }
 
-void load_atlas(BrickPlan& plan, const std::vector<BrickId>& wanted, const BrickRequest& request, Evaluation& ev) {
+void load_atlas(BrickPlan& plan, const std::vector<WantedBrick>& wanted, const BrickRequest& request, Evaluation& ev) {
     for (;;) {
         const std::uint64_t families = BrickCache::global().counters().families_decoded;
         const Atlas::Counters c = plan.atlas->load(plan.bricks, wanted, ev.stop(), [&](double f) {
@@ -174,6 +184,7 @@ Hash occupancy_key(const std::vector<Page>& pages, const Atlas& atlas, const Bri
         box(p.cell.lo);
         box(p.cell.hi);
         h.value(p.parent ? p.parent->level : -1);
+        for (float share : p.blend) h.value(share);
     }
     return h.finish();
 }
@@ -259,8 +270,8 @@ BrickOccupancy find_occupancy(const BricksDesc& desc, const std::vector<Page>& p
 
 std::vector<BrickId> BrickPlan::missing() const {
     std::vector<BrickId> out;
-    for (const BrickId& id : wanted)
-        if (!atlas->has(id)) out.push_back(id);
+    for (const WantedBrick& brick : wanted)
+        if (!atlas->has(brick)) out.push_back(brick.id);
     return out;
 }
 
@@ -275,6 +286,8 @@ BrickPlan plan_bricks(const BricksPtr& bricks, const Selection* selection, const
     plan.pages = pages_of(*bricks, selection, [&](ValueRange r) { return request.visible(plan.range.min, r.min, r.max); }, transparent);
     ev.count("bricks skipped (transparent)", double(transparent));
     if (plan.pages.empty()) return plan;
+    if (request.mix_when_loaded)
+        for (Page& p : plan.pages) p.parent.reset();
     plan.wanted = bricks_of(plan.pages);
     ev.count("bricks drawn", double(plan.wanted.size()));
     plan.grid = grid_of(bricks->desc(), plan.pages);
@@ -315,7 +328,7 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
     if (request.in_view && atlas->places().whole()) {
         PageGrid joined = merged(desc, grid, [&](BrickId id) {
             const ValueRange r = bricks->info(id).range;
-            return !request.visible(scene.range.min, r.min, r.max) || !request.in_view(desc.fine_box_of(id));
+            return !atlas->blends(id) && (!request.visible(scene.range.min, r.min, r.max) || !request.in_view(desc.fine_box_of(id)));
         });
         // Boxes of small cells may be more than the large bricks that they are of.
         if (joined.pages.size() <= grid.pages.size()) grid = std::move(joined);

@@ -38,7 +38,7 @@ struct BrickScene {
     glm::ivec3 cells{0};
     glm::vec3 slot_at{0.0f}, slot_lo{0.0f}, slot_hi{0.0f}, scale{1.0f};  // of the one page; slot_lo: of all
     glm::vec3 brick_size{1.0f}, brick_hi{0.0f};  // voxels of a brick; the last one of them in its slot
-    bool blended = false;            // some page mixes in its parent
+    bool blended = false;            // on some page the shader mixes in its parent
     int steps = 1;                   // slices of pages are 1, 2, ... 2^(steps-1) planes apart; of one level:
     int step = 1;                    // so many
 
@@ -54,6 +54,9 @@ struct BrickRequest {
     // Whether anything with values between lo and hi is seen, where none is below `least`.
     std::function<bool(double least, double lo, double hi)> visible;
     Hash visible_key;                // of all that the answer depends on
+    // Bricks that blend get their parents mixed in when they are loaded; else the shader mixes the two. What
+    // is interpolated linearly between voxels may be.
+    bool mix_when_loaded = false;
     // Whether rays may come to a box of voxels of level 0. Null: pages are not joined, each is a brick.
     std::function<bool(const Box&)> in_view;
     std::uint64_t gpu_bytes = 0;     // that bricks and all tables may take at once ...
@@ -65,7 +68,7 @@ struct BrickPlan {
     BricksPtr bricks;
     ValueRange range;                // of every value that any brick can hold
     std::vector<Page> pages;         // empty: nothing can be seen
-    std::vector<BrickId> wanted;
+    std::vector<WantedBrick> wanted;
     PageGrid grid;                   // of the pages, before any are joined
     std::shared_ptr<Atlas> atlas;
     std::vector<BrickId> missing() const;  // on the GPU

@@ -83,33 +83,36 @@ std::shared_ptr<Selection> nested(const BricksDesc& desc, int octant) {
     }
 }
 
-// One fine octant within coarse ones, blended as lod.balance does.
-std::shared_ptr<Selection> two_levels(const BricksDesc& desc, int octant, bool blended) {
-    const int top = int(desc.levels.size()) - 1;
-    auto s = level_of(desc, top - 1);
+// Each octant drawn so many levels finer than the brick that it is, blended as lod.balance does: at corners that
+// touch a coarser octant.
+std::shared_ptr<Selection> octants(const BricksDesc& desc, std::array<int, 8> depth, bool blended) {
+    const int coarse = int(desc.levels.size()) - 2;
+    auto s = level_of(desc, coarse);
     std::vector<SelectedBrick> bricks;
-    for (const SelectedBrick& b : s->bricks) {
-        if (desc.octant_of(b.id) != octant) {
-            bricks.push_back(b);
-            continue;
-        }
-        const glm::ivec3 begin = b.id.index * 2;
-        for (const BrickId& id : desc.finer(b.id)) {
-            SelectedBrick fine;
-            fine.id = id;
+    for (const SelectedBrick& whole : s->bricks) {
+        const int octant = desc.octant_of(whole.id), own = depth[std::size_t(octant)], n = 1 << own;
+        auto of_octant = level_of(desc, coarse - own);
+        for (SelectedBrick b : of_octant->bricks) {
+            if (b.id.index / n != whole.id.index) continue;
             for (int c = 0; c < 8 && blended; ++c) {
-                const glm::ivec3 corner = id.index + glm::ivec3(c & 1, c >> 1 & 1, c >> 2);
-                // On a face of the octant, and not at the volume's end: a coarser brick is there.
-                for (int a = 0; a < 3; ++a) {
-                    const int upper = octant >> a & 1;
-                    if (corner[a] == begin[a] + (upper ? 0 : 2)) fine.corner_blend[std::size_t(c)] = 1;
+                const glm::ivec3 corner = b.id.index + glm::ivec3(c & 1, c >> 1 & 1, c >> 2);
+                for (int other = 0; other < 8; ++other) {
+                    bool touches = depth[std::size_t(other)] < own;
+                    for (int a = 0; a < 3; ++a) touches = touches && (corner[a] == n || (corner[a] > n) == bool(other >> a & 1));
+                    if (touches) b.corner_blend[std::size_t(c)] = 1;
                 }
             }
-            bricks.push_back(fine);
+            bricks.push_back(b);
         }
     }
     s->bricks = bricks;
     return s;
+}
+// One fine octant within coarse ones.
+std::shared_ptr<Selection> two_levels(const BricksDesc& desc, int octant, bool blended) {
+    std::array<int, 8> depth{};
+    depth[std::size_t(octant)] = 1;
+    return octants(desc, depth, blended);
 }
 
 Camera looking(glm::dvec3 from, const VolumeDesc& desc, Camera::Projection projection, double distance = 1.5) {
@@ -455,6 +458,37 @@ TEST(BrickPath, BricksComeAndGoWithoutATrace) {
     NodeRun back = draw(bricks, half(false), smooth(240), camera, ", gpu_memory: 4");
     EXPECT_GT(back.counters["bricks evicted"], 0);
     EXPECT_LT(largest_difference(*a, *back.image()), 1e-5);  // other slots round otherwise
+}
+
+TEST(BrickPath, MixturesLeaveNoTrace) {
+    // Selections in turn, each of which mixes other bricks: every picture is the one that fresh bricks give, side by
+    // side in the texture or in slots.
+    const VolumePtr smooth_one = blob({64, 64, 64});
+    const VolumePtr noise = make_volume({64, 64, 64}, ScalarType::u8, [](auto x, auto y, auto z) { return double((x * 7919 + y * 104729 + z * 1299709) % 251); });
+    const TransferPtr all = smooth(240), some = transfer({{{100, Emission(0)}, {120, Emission(0.3)}, {140, Emission(0.3)}, {160, Emission(0)}}});
+    const BricksPtr kept[] = {pyramid(smooth_one, 8), pyramid(noise, 8)};
+    std::mt19937 random(3);
+    for (int turn = 0; turn < 80; ++turn) {
+        const bool slots = turn % 3 == 0;  // they round otherwise in another place, which noise would not forgive
+        const VolumePtr& volume = slots ? smooth_one : noise;
+        const BricksPtr& bricks = kept[!slots];
+        std::array<int, 8> depth;
+        for (int& d : depth) d = int(random() % 3);
+        const SelectionPtr s = octants(bricks->desc(), depth, random() % 4 > 0);
+        const TransferPtr tf = random() % 2 ? all : some;
+        const Camera camera = looking(kViews[random() % 6], volume->desc(), kPerspective);
+        const std::string mode = std::string(random() % 2 ? ", shading: true" : "") + ", table_size: 64, gpu_memory: " + (slots ? "8" : "2048");
+        const ImagePtr image = draw(bricks, s, tf, camera, mode).image();
+        EXPECT_LT(largest_difference(*image, *draw(pyramid(volume, 8), s, tf, camera, mode).image()), slots ? 1e-4 : 1e-6) << turn << mode;
+    }
+}
+
+TEST(BrickPath, PagesOfALevelAreOneWhetherTheyBlendOrNot) {
+    const BricksPtr bricks = pyramid(blob({128, 128, 128}, ScalarType::u16), 16);
+    NodeRun run = draw(bricks, two_levels(bricks->desc(), 5, true), smooth(65535), looking({1, 0.6, 0.4}, bricks->desc().volume, kPerspective));
+    EXPECT_LT(run.counters["pages drawn"], 0.6 * run.counters["bricks drawn"]);
+    // A parent that is mixed in is no brick of the picture.
+    EXPECT_EQ(run.counters["bricks drawn"], double(two_levels(bricks->desc(), 5, true)->bricks.size()));
 }
 
 TEST(BrickPath, TheLimitHoldsWhateverIsLookedAt) {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 #include <tuple>
+#include <unordered_set>
 
 namespace voxloom::slicer {
 
@@ -14,7 +14,12 @@ std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, con
     auto add = [&](const SelectedBrick& b) {
         const bool blends = std::ranges::any_of(b.corner_blend, [](float r) { return r > 0; });
         const std::optional<BrickId> parent = blends ? desc.coarser(b.id) : std::nullopt;
-        if (!visible(bricks.info(b.id).range) && !(parent && visible(bricks.info(*parent).range))) {
+        ValueRange range = bricks.info(b.id).range;
+        if (parent) {
+            const ValueRange coarse = bricks.info(*parent).range;
+            range = {std::min(range.min, coarse.min), std::max(range.max, coarse.max)};
+        }
+        if (!visible(range)) {
             ++transparent;
             return;
         }
@@ -38,15 +43,19 @@ std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, con
     return pages;
 }
 
-std::vector<BrickId> bricks_of(const std::vector<Page>& pages) {
-    std::vector<BrickId> all;
-    std::set<std::tuple<int, int, int, int>> known;
-    auto add = [&](BrickId id) {
-        if (known.emplace(id.level, id.index.x, id.index.y, id.index.z).second) all.push_back(id);
+std::vector<WantedBrick> bricks_of(const std::vector<Page>& pages) {
+    std::vector<WantedBrick> all;
+    std::unordered_set<BrickId, HashOfBrickId> known;
+    auto add = [&](const WantedBrick& brick) {
+        if (known.insert(brick.id).second) all.push_back(brick);
     };
     for (const Page& p : pages) {
-        add(p.brick);
-        if (p.parent) add(*p.parent);
+        if (p.parent) {
+            add({p.brick});
+            add({*p.parent});
+        } else {
+            add({p.brick, p.blend});
+        }
     }
     return all;
 }

@@ -17,7 +17,7 @@ struct Page {
     Box cell;                     // voxels of level 0
     int cell_level = 0;           // it is as large as a brick of this one
     std::array<float, 8> blend{};
-    std::optional<BrickId> parent = std::nullopt;  // where it blends
+    std::optional<BrickId> parent = std::nullopt;  // where it blends and the shader is to mix; else its texels are mixed
     bool merged = false;          // of bricks that lie side by side in the texture too
 };
 
@@ -28,7 +28,7 @@ using IsVisible = std::function<bool(ValueRange)>;
 // visible cost nothing further. `transparent` counts them.
 std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, const IsVisible& visible, std::size_t& transparent);
 // The bricks that pages need, each once.
-std::vector<BrickId> bricks_of(const std::vector<Page>& pages);
+std::vector<WantedBrick> bricks_of(const std::vector<Page>& pages);
 
 // Space as a grid of cells as large as the smallest page; a cell is drawn by one page, or none (-1).
 struct PageGrid {

@@ -236,6 +236,7 @@ BrickJob plan_bricks(const Scene& scene, const View& view, Evaluation& ev) {
         return is_visible(scene, least, lo, hi);
     };
     request.visible_key = cubic ? key("cubic", what_is_visible(scene), {}) : what_is_visible(scene);
+    request.mix_when_loaded = s.reconstruction == S::Reconstruction::trilinear && (!uses_gradient(scene) || s.gradient_stored);
     request.in_view = [&view](const Box& box) { return view.may_meet(box); };
     const TransferFunction2D* two = scene.transfer->two.get();
     const std::uint64_t texels = two ? std::uint64_t(two->dims.x) * std::uint64_t(two->dims.y)
@@ -473,8 +474,12 @@ gpu::ProgramPtr assemble(const Scene& scene, const Prepared& p, const Lighting& 
                            fmt::format("{:.1f}", p.bricks && !paged ? p.bricks->step : 1.0),
                            p.bricks ? "(1.0 / page_scale)" : "vec3(1.0)", paged ? "open_page(ray_at(m))" : "",
                            paged ? "march_bricks" : "march");
-    choices += fmt::format("#define GRADIENT_AT {0}\n#define CLASSIFIED_AT {1}\n", p.bricks ? "gradient_at" : "gradient_reconstruct",
-                           p.bricks ? "classified_at" : "classified_reconstruct");
+    // A parent's gradients are per step of its own level.
+    const std::string_view at = p.bricks ? "at" : "reconstruct";
+    choices += paged && p.bricks->blended
+                   ? "#define GRADIENT_AT(p) mix(gradient_own(p), gradient_parent(p) * vec4(parent_scale / page_scale, 1.0), share_of_parent(p))\n"
+                   : fmt::format("#define GRADIENT_AT gradient_{}\n", at);
+    choices += fmt::format("#define CLASSIFIED_AT classified_{}\n", at);
     choices += fmt::format("#define LIGHTS {}\n#define SIDE {:.9f}\n", lighting.place.size(),
                            smoothing_side(s.gradient));
 
@@ -688,7 +693,7 @@ void show_while_decoding(const Scene& scene, const View& view, const VolumeDesc&
     const S& s = scene.settings;
     const std::vector<BrickId> missing = job.plan.missing();
     if (missing.empty()) return;
-    Decoding decoding(job.plan.bricks, missing, Atlas::kReach, 0);
+    Decoding decoding(job.plan.bricks, missing, kReach, 0);
     double wait = s.first_picture;
     while (!decoding.wait(wait, ev.stop())) {
         const std::int64_t start = wall_ns();
@@ -745,7 +750,7 @@ ImagePtr render(const Scene& scene, Evaluation& ev) {
                             "instead", s.slice_distance, view.planes, coarser));
         view = View(*scene.camera, desc, s.size, coarser);
     }
-    if (as_bricks) view.limit_reach(Atlas::kReach - (s.reconstruction == S::Reconstruction::tricubic));
+    if (as_bricks) view.limit_reach(kReach - (s.reconstruction == S::Reconstruction::tricubic));
 
     const View planned = view;
     std::optional<BrickJob> job;
