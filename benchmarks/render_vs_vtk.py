@@ -13,10 +13,14 @@ differences interpolated like the values, which is what VTK's GPU ray caster com
 caster rounds normals to a table of directions and lights the voxels, not the samples: that is part
 of its error. Surfaces at which light is added without limit are clamped to 1 in every picture.
 
-    benchmarks/render_vs_vtk.py [--build build/release] [--quick] [--clock cpu] [--truth DIR] [--out DIR]
+    benchmarks/render_vs_vtk.py [--build build/release] [--quick] [--bricks] [--clock cpu] [--truth DIR] [--out DIR]
 
 writes the table to standard output and as CSV and Markdown to DIR, and after it, for every picture
 of VTK, the fastest of slicer.render whose error is not larger.
+
+With --bricks, slicer.render draws bricks of 32^3 that lod.transfer-aware selects to 1/500, balanced, of every
+3-D volume in the folder of real volumes; a picture's time has that of the selection in it, and VTK is its
+GPU ray caster alone.
 """
 
 import argparse
@@ -39,12 +43,15 @@ LIGHT = {"ambient": 0.2, "diffuse": 0.7, "specular": 0.2, "shininess": 20}
 MARSCHNER_LOBB = ("readers.phantom", {"kind": "marschner-lobb", "dims": [256, 256, 256], "type": "u8"})
 
 
-def scenes(data, quick):
-    found = {"marschner-lobb": MARSCHNER_LOBB}
+def scenes(data, quick, bricks):
+    found = {} if bricks else {"marschner-lobb": MARSCHNER_LOBB}
     if quick:
         kind, params = MARSCHNER_LOBB
         return {"marschner-lobb": (kind, dict(params, dims=[64, 64, 64]))}
-    for name in ("engine", "cthead", "cranium-ct"):
+    names = ["engine", "cthead", "cranium-ct"]
+    if bricks and data:
+        names = sorted(p.stem for p in data.glob("*.nrrd") if not p.stem.endswith("-4d"))
+    for name in names:
         if data and (data / f"{name}.nrrd").exists():
             found[name] = ("readers.volume", {"path": str(data / f"{name}.nrrd")})
         else:
@@ -59,16 +66,17 @@ TRANSFERS = {
 }
 SLICE_DISTANCES = (0.25, 0.5, 1, 2, 3, 4)
 VTK_STEPS = (0.25, 0.5, 1, 2)
+SELECTION = ("detail", "balanced")  # the nodes that select bricks
 CLOCKS = {"wall": time.perf_counter, "cpu": time.process_time}
 COLUMNS = ("scene", "transfer", "shaded", "size", "renderer", "setting", "ms", "rmse", "psnr_db",
            "max_error", "speed_vs_vtk_gpu")
 
 
-def slicer_views(shaded):
+def slicer_views(bricks):
     """{node: (setting, parameters)}: what slicer.render is asked to draw."""
     views = {}
     for classification in ("pre-integrated", "post"):
-        for step in SLICE_DISTANCES:
+        for step in SLICE_DISTANCES[bricks:]:
             name = f"slicer_{classification.replace('-', '_')}_{str(step).replace('.', '_')}"
             views[name] = (f"{classification}, {step} voxels",
                            {"classification": classification, "slice_distance": step})
@@ -86,6 +94,14 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
         "camera": ("scene.camera", {"fit": "ct.volume"}, {"azimuth": 30, "elevation": 20}),
     }
     eye = drawer.draw(label, nodes, ["camera.camera"])["values"]["camera.camera"]["eye"]
+    if options.bricks:
+        nodes |= {
+            "pyramid": ("bricks.pyramid", {"volume": "ct.volume"}, {}),
+            "detail": ("lod.transfer-aware", {"bricks": "pyramid.bricks", "camera": "camera.camera", "transfer": "tf.transfer"},
+                       {"size": [size, size], "max_bricks": 1000000, "max_error": 0.002}),
+            "balanced": ("lod.balance", {"bricks": "pyramid.bricks", "selection": "detail.selection"}, {"max_bricks": 0}),
+        }
+    drawn = dict(wires, source="pyramid.bricks", selection="balanced.selection") if options.bricks else wires
     nodes |= {
         "tf": ("scene.transfer", {"fit": "ct.volume"}, TRANSFERS[transfer]),
         "lights": ("scene.lights", {}, {"headlight": 0, "point": [eye], **LIGHT}),
@@ -95,11 +111,12 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
     kept = pathlib.Path(options.truth) / f"{label}.npy" if options.truth else None
     known = kept is not None and kept.exists()
     outputs = ["ct.volume", "tf.transfer", "camera.camera"] + ([] if known else ["truth.image"])
-    views = slicer_views(shaded) if drawer.has("render-slicer") else {}
+    views = slicer_views(options.bricks) if drawer.has("render-slicer") else {}
     for name, (_, params) in views.items():
-        nodes[name] = ("slicer.render", wires, {**common, **params})
+        nodes[name] = ("slicer.render", drawn, {**common, **params})
         outputs.append(f"{name}.image")
-    result = drawer.draw(label, nodes, outputs, timed=views, repeat=repeat)
+    selecting = SELECTION if options.bricks else ()
+    result = drawer.draw(label, nodes, outputs, timed=[*views, *selecting], repeat=repeat)
     truth = np.load(kept) if known else pictures.picture(result, "truth.image")
     if kept and not known:
         kept.parent.mkdir(parents=True, exist_ok=True)
@@ -112,7 +129,7 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
                          *pictures.errors(image, truth)])
 
     for name, (setting, _) in views.items():
-        row("slicer.render", setting, statistics.median(result["times"][name][options.clock]),
+        row("slicer.render", setting, sum(statistics.median(result["times"][n][options.clock]) for n in (name, *selecting)),
             pictures.in_8_bits(pictures.picture(result, f"{name}.image")))
 
     gpu = {}
@@ -120,7 +137,7 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
         volume, tf = result["values"]["ct.volume"], result["values"]["tf.transfer"]
         table = vtk_ray_casters.TransferTable(tf["points"], tf["reference_length"], volume["range"])
         voxels = np.load(volume["file"])
-        for kind in ("gpu", "cpu"):
+        for kind in ("gpu",) if options.bricks else ("gpu", "cpu"):
             caster = vtk_ray_casters.RayCaster(
                 vtk, kind, voxels, volume["index_to_world"], table, result["values"]["camera.camera"],
                 (size, size), LIGHT if shaded else None)
@@ -176,7 +193,9 @@ def main():
     parser.add_argument("--build", default=str(pictures.SOURCE / "build" / "release"))
     parser.add_argument("--out", default="out/render_vs_vtk", help="folder of the tables")
     parser.add_argument("--quick", action="store_true", help="one small scene, one size: seconds")
-    parser.add_argument("--sizes", type=int, nargs="+", help="picture sizes (256 512 1024)")
+    parser.add_argument("--bricks", action="store_true", help="draw bricks, of all real volumes, beside VTK's GPU ray caster")
+    parser.add_argument("--sizes", type=int, nargs="+", help="picture sizes (256 512 1024; with --bricks 512 1024)")
+    parser.add_argument("--unshaded", action="store_true", help="no shaded pictures")
     parser.add_argument("--scenes", nargs="+", help="only these")
     parser.add_argument("--repeat", type=int, help="pictures per median (9)")
     parser.add_argument("--clock", choices=CLOCKS, default="wall", help="time by the clock or of the processor")
@@ -189,18 +208,18 @@ def main():
         vtk_ray_casters.start_display()
     except (ImportError, OSError, RuntimeError) as reason:
         print(f"skipped VTK: {reason} (packages python3-vtk9 and xvfb)", file=sys.stderr)
-    sizes = options.sizes or ([96] if options.quick else [256, 512, 1024])
+    sizes = options.sizes or ([96] if options.quick else [256, 512, 1024][options.bricks:])
     options.repeat = options.repeat or (3 if options.quick else 9)
     rows = []
     with tempfile.TemporaryDirectory(prefix="voxloom-bench-") as folder:
         drawer = pictures.Drawer(options.build, folder)
         if not drawer.has("render-slicer"):
             print("skipped slicer.render: its plugin is not built", file=sys.stderr)
-        for scene, source in scenes(pictures.data_folder(), options.quick).items():
+        for scene, source in scenes(pictures.data_folder(), options.quick, options.bricks).items():
             if options.scenes and scene not in options.scenes:
                 continue
             for transfer in TRANSFERS:
-                for shaded in (False, True):
+                for shaded in (False,) if options.unshaded else (False, True):
                     for size in sizes:
                         measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows)
     write_tables(rows, pathlib.Path(options.out))
