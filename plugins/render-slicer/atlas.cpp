@@ -74,7 +74,7 @@ Atlas::Atlas(const BricksPtr& bricks, const Texels& texels, Apron apron, const P
     : texels_(texels), apron_(apron), places_(places), brick_(bricks->desc().brick),
       side_(side_of(bricks->desc(), apron)), begun_(bricks->desc().levels.size(), false) {
     for (int a = 0; a < 3; ++a) {
-        block_[a] = brick_[a] % 8 == 0 ? 8 : brick_[a];
+        block_[a] = brick_[a] % 4 == 0 ? 4 : brick_[a];
         blocks_[a] = brick_[a] / block_[a];
     }
     auto make = [&](GLenum format) {

@@ -93,16 +93,11 @@ bool write_texels(const Decoded& voxels, glm::ivec3 first, glm::ivec3 side, cons
     return invalid;
 }
 
-// Widens `range` by one value, rounded outwards.
-void widen(glm::vec2& range, double v) {
-    float below = float(v), above = below;
-    if (double(below) > v) below = std::nextafter(below, -kInfinity);
-    if (double(above) < v) above = std::nextafter(above, kInfinity);
-    range = {std::min(range.x, below), std::max(range.y, above)};
-}
+const glm::vec2 kNothing(kInfinity, -kInfinity);
 void widen(glm::vec2& range, glm::vec2 by) { range = {std::min(range.x, by.x), std::max(range.y, by.y)}; }
 
-// Calls use(range_of), where range_of(i, range) widens a range by voxel i where that is valid.
+// Calls use(range_of), where range_of(i) is voxel i's value as a range, rounded outwards, or nothing where that is
+// not valid.
 template <class Use>
 void with_values(const Decoded& voxels, int from, const Use& use) {
     const VolumeDesc& desc = voxels.volume.desc();
@@ -111,31 +106,45 @@ void with_values(const Decoded& voxels, int from, const Use& use) {
         const T* const v = reinterpret_cast<const T*>(voxels.volume.data());
         const bool color = desc.color;
         const std::size_t c = std::size_t(desc.components);
-        use([&voxels, v, c, color, from](std::size_t i, glm::vec2& range) {
+        use([&voxels, v, c, color, from](std::size_t i) {
             const T* p = v + i * c;
+            if (!voxels.mask.empty() && !voxels.mask[i]) return kNothing;
+            if constexpr (sizeof(T) <= 2 || std::is_same_v<T, float>)
+                if (!color) return std::isfinite(float(p[from])) ? glm::vec2(float(p[from])) : kNothing;
             const double value = color ? 0.2126 * double(p[0]) + 0.7152 * double(p[1]) + 0.0722 * double(p[2]) : double(p[from]);
-            if ((voxels.mask.empty() || voxels.mask[i]) && std::isfinite(value)) widen(range, value);
+            if (!std::isfinite(value)) return kNothing;
+            const float f = float(value);
+            return glm::vec2(double(f) > value ? std::nextafter(f, -kInfinity) : f, double(f) < value ? std::nextafter(f, kInfinity) : f);
         });
     });
 }
 
-// What lies within kReach of the blocks of a brick that begins kReach behind the first of `voxels`.
+// What lies within kReach of the blocks of a brick that begins kReach behind the first of `voxels`: along x, then
+// of what that gives along y, then along z.
 std::vector<glm::vec2> ranges_of_blocks(const Decoded& voxels, int from, glm::ivec3 block, glm::ivec3 blocks) {
-    const glm::ivec3 n = voxels.dims();
-    std::vector<glm::vec2> ranges(voxels_in(blocks), {kInfinity, -kInfinity});
-    with_values(voxels, from, [&](const auto& widen_by) {
-        std::vector<glm::vec2> columns(std::size_t(n.x));  // ranges of the columns of a block's rows
-        for (int bz = 0; bz < blocks.z; ++bz)
-            for (int by = 0; by < blocks.y; ++by) {
-                std::ranges::fill(columns, glm::vec2(kInfinity, -kInfinity));
-                for (int z = bz * block.z; z <= (bz + 1) * block.z + 2 * kReach && z < n.z; ++z)
-                    for (int y = by * block.y; y <= (by + 1) * block.y + 2 * kReach && y < n.y; ++y)
-                        for (int x = 0; x < n.x; ++x) widen_by(index_in(n, x, y, z), columns[std::size_t(x)]);
-                for (int bx = 0; bx < blocks.x; ++bx)
-                    for (int x = bx * block.x; x <= (bx + 1) * block.x + 2 * kReach && x < n.x; ++x)
-                        widen(ranges[index_in(blocks, bx, by, bz)], columns[std::size_t(x)]);
-            }
+    glm::ivec3 n = voxels.dims();
+    std::vector<glm::vec2> ranges(voxels_in(n));
+    with_values(voxels, from, [&](const auto& range_of) {
+        for (std::size_t i = 0; i < ranges.size(); ++i) ranges[i] = range_of(i);
     });
+    for (int axis = 0; axis < 3; ++axis) {
+        glm::ivec3 fewer = n;
+        fewer[axis] = blocks[axis];
+        const std::size_t stride = index_in(n, axis == 0, axis == 1, axis == 2);
+        std::vector<glm::vec2> joined(voxels_in(fewer), kNothing);
+        for (int z = 0; z < fewer.z; ++z)
+            for (int y = 0; y < fewer.y; ++y)
+                for (int x = 0; x < fewer.x; ++x) {
+                    glm::ivec3 first(x, y, z);
+                    first[axis] *= block[axis];
+                    const glm::vec2* r = ranges.data() + index_in(n, first.x, first.y, first.z);
+                    const int count = std::min(block[axis] + 2 * kReach + 1, n[axis] - first[axis]);
+                    glm::vec2& out = joined[index_in(fewer, x, y, z)];
+                    for (int i = 0; i < count; ++i, r += stride) widen(out, *r);
+                }
+        ranges = std::move(joined);
+        n = fewer;
+    }
     return ranges;
 }
 
@@ -227,7 +236,7 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
 
     // Each of the parent's voxels counts in the blocks that something is interpolated from it for.
     const glm::ivec3 n = voxels.dims();
-    with_values(voxels, texels.layout.from, [&](const auto& widen_by) {
+    with_values(voxels, texels.layout.from, [&](const auto& range_of) {
         for (int z = 0; z < n.z; ++z)
             for (int y = 0; y < n.y; ++y)
                 for (int x = 0; x < n.x; ++x) {
@@ -239,7 +248,7 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
                     }
                     for (int bz = lo.z; bz <= hi.z; ++bz)
                         for (int by = lo.y; by <= hi.y; ++by)
-                            for (int bx = lo.x; bx <= hi.x; ++bx) widen_by(index_in(n, x, y, z), filled.ranges[index_in(blocks, bx, by, bz)]);
+                            for (int bx = lo.x; bx <= hi.x; ++bx) widen(filled.ranges[index_in(blocks, bx, by, bz)], range_of(index_in(n, x, y, z)));
                 }
     });
     return invalid;

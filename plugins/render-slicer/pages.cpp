@@ -173,7 +173,7 @@ glm::ivec3 table_dims(std::size_t pages) {
 std::uint64_t table_bytes(const BricksDesc& bricks, const PageGrid& grid) {
     const glm::ivec3 dims = table_dims(grid.pages.size());
     std::uint64_t blocks = grid.page.size();  // as Atlas::block() cuts bricks
-    for (int a = 0; a < 3; ++a) blocks *= std::uint64_t(bricks.brick[a] % 8 == 0 ? bricks.brick[a] / 8 : 1);
+    for (int a = 0; a < 3; ++a) blocks *= std::uint64_t(bricks.brick[a] % 4 == 0 ? bricks.brick[a] / 4 : 1);
     return std::uint64_t(dims.x) * std::uint64_t(dims.y) * sizeof(glm::vec4) + grid.page.size() * sizeof(float) +
            std::min(blocks, std::uint64_t(kMostBlocks));
 }
