@@ -106,7 +106,8 @@ void compare(const std::string& volume_name, const Options& options) {
             const NodeInputs view = {{"bricks", {bricks}}, {"camera", {camera.outputs.at("camera")}}};
             std::vector<std::pair<std::string, SelectionPtr>> selections;
             auto balanced = [&](const NodeRun& run) {
-                return node("lod.balance", "{max_bricks: 0}", {{"bricks", {bricks}}, {"selection", {run.outputs.at("selection")}}})
+                return node("lod.balance", "{max_bricks: 0}", {{"bricks", {bricks}}, {"selection", {run.outputs.at("selection")}},
+                                                               {"transfer", {transfer.outputs.at("transfer")}}})
                     .output<Selection>("selection");
             };
             if (zoom < 1) {

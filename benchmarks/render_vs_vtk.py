@@ -18,7 +18,7 @@ of its error. Surfaces at which light is added without limit are clamped to 1 in
 writes the table to standard output and as CSV and Markdown to DIR, and after it, for every picture
 of VTK, the fastest of slicer.render whose error is not larger.
 
-With --bricks, slicer.render draws bricks of 32^3 that lod.transfer-aware selects to 1/500, balanced, of every
+With --bricks, slicer.render draws bricks of 32^3 that lod.transfer-aware selects to 1/10000, balanced, of every
 3-D volume in the folder of real volumes; a picture's time has that of the selection in it, and VTK is its
 GPU ray caster alone.
 """
@@ -76,7 +76,7 @@ def slicer_views(bricks):
     """{node: (setting, parameters)}: what slicer.render is asked to draw."""
     views = {}
     for classification in ("pre-integrated", "post"):
-        for step in SLICE_DISTANCES[bricks:]:
+        for step in (0.5, 1, 2, 4) if bricks else SLICE_DISTANCES:
             name = f"slicer_{classification.replace('-', '_')}_{str(step).replace('.', '_')}"
             views[name] = (f"{classification}, {step} voxels",
                            {"classification": classification, "slice_distance": step})
@@ -98,8 +98,9 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
         nodes |= {
             "pyramid": ("bricks.pyramid", {"volume": "ct.volume"}, {}),
             "detail": ("lod.transfer-aware", {"bricks": "pyramid.bricks", "camera": "camera.camera", "transfer": "tf.transfer"},
-                       {"size": [size, size], "max_bricks": 1000000, "max_error": 0.002}),
-            "balanced": ("lod.balance", {"bricks": "pyramid.bricks", "selection": "detail.selection"}, {"max_bricks": 0}),
+                       {"size": [size, size], "max_bricks": 1000000, "max_error": 0.0001}),
+            "balanced": ("lod.balance", {"bricks": "pyramid.bricks", "selection": "detail.selection", "transfer": "tf.transfer"},
+                         {"max_bricks": 0}),
         }
     drawn = dict(wires, source="pyramid.bricks", selection="balanced.selection") if options.bricks else wires
     nodes |= {
@@ -141,7 +142,7 @@ def measure(drawer, vtk, scene, source, transfer, shaded, size, options, rows):
             caster = vtk_ray_casters.RayCaster(
                 vtk, kind, voxels, volume["index_to_world"], table, result["values"]["camera.camera"],
                 (size, size), LIGHT if shaded else None)
-            for step in VTK_STEPS:
+            for step in VTK_STEPS[options.bricks:]:
                 image, seconds = caster.draw(step, repeat, clock=CLOCKS[options.clock])
                 if kind == "gpu":
                     gpu[step] = seconds

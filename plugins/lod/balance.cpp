@@ -172,6 +172,10 @@ void CompleteTree::set_corner_blends() {
         node.corner_blend.fill(0.0f);
         for_each_neighbour(bricks_, node.id, [&](BrickId other, glm::ivec3 offset) {
             if (find(other) >= 0) return;  // as fine as this one, or finer
+            std::int32_t coarser = -1;
+            for (std::optional<BrickId> above = bricks_.coarser(other); above && coarser < 0; above = bricks_.coarser(*above))
+                coarser = find(*above);
+            if (coarser < 0 || !cut_.nodes[std::size_t(coarser)].draws()) return;  // shows nothing to blend into
             // The corners that the neighbour touches: on each axis its own side, or both.
             for (int corner = 0; corner < 8; ++corner) {
                 bool touches = true;

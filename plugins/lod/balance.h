@@ -2,9 +2,9 @@
 //
 // LaMar, Duchaineau, Hamann, Joy: Multiresolution techniques for interactive texture-based rendering of
 // arbitrarily oriented cutting planes, 2000, section 4.3. Bricks that share a face, an edge or a corner
-// may differ by one level; corners that touch a coarser brick show the coarser samples. Both are decided
-// over the complete tree that a selection implies, with what it leaves out, since a brick that is seen
-// may meet two others through one that is not.
+// may differ by one level; corners that touch a coarser brick that is drawn show the coarser samples. Which levels
+// meet is decided over the complete tree that a selection implies, with what it leaves out, since a brick that is
+// seen may meet two others through one that is not.
 #pragma once
 
 #include <functional>

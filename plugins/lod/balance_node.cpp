@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kMethod = R"(
 Splits bricks until any two that share a face, an edge or a corner differ by one level at most, then
-decides how they blend: a corner that touches a coarser brick shows that brick's samples, every other corner
+decides how they blend: a corner that touches a coarser brick that is drawn shows that brick's samples, every other corner
 its own, and in between they are mixed trilinearly. On a face between levels both sides then show the
 coarser samples, and nothing cracks. Octants of bricks that were replaced in part become bricks of their own.
 
@@ -19,8 +19,8 @@ cracks: a brick off the plane or outside of the view can be what makes two other
 
 What is split off is drawn where the selection's camera and plane can see it. If that makes more than
 `max_bricks`, families are merged again, those first whose merged brick is least wrong in the picture and
-whose neighbours allow it, until the budget holds. Predicted errors are those of the balanced bricks; with
-a transfer function wired they are bounds after classification, as `lod.transfer-aware` gives them.
+whose neighbours allow it, until the budget holds. Predicted errors are those of the balanced bricks, with what they mix in of
+coarser ones; with a transfer function wired they are bounds after classification, as `lod.transfer-aware` gives them.
 
 **Use it** behind any selection that a picture is made of. **Do not use it** where steps between levels are
 to be seen, or to compare policies by their bricks alone.
@@ -67,8 +67,9 @@ void evaluate(Evaluation& ev) {
         if (!tree.merge_down_to(most, price, ev.stop()))
             ev.warn(fmt::format("no balanced selection of {} bricks was found; {} are left", most, tree.drawn()));
     }
-    tree.set_corner_blends();
     predict_errors(tree.cut(), desc, errors, sight ? &*sight : nullptr);
+    tree.set_corner_blends();
+    add_blend_errors(tree.cut(), desc, errors, sight ? &*sight : nullptr);
     list_bricks(tree.cut(), desc, sight ? &*sight : nullptr, *selection);
     output_selection(ev, selection);
 }

@@ -51,7 +51,7 @@ void expect_blends(const CompleteTree& tree, const BricksDesc& desc) {
             float want = 0;
             for (const Cut::Node* b : leaves) {
                 const Region q = whole_region(desc, b->id);
-                if (b->id.level > a->id.level && glm::all(glm::lessThanEqual(q.lo, at)) && glm::all(glm::lessThanEqual(at, q.hi)))
+                if (b->draws() && b->id.level > a->id.level && glm::all(glm::lessThanEqual(q.lo, at)) && glm::all(glm::lessThanEqual(at, q.hi)))
                     want = 1;
             }
             EXPECT_EQ(a->corner_blend[std::size_t(corner)], want);
