@@ -4,13 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <fstream>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/base/text.h"
-#include "core/graph/graph_text.h"
+#include "core/graph/graph_edit.h"
 
 namespace voxloom {
 
@@ -161,20 +162,25 @@ GraphNode& Document::node_of(Graph& graph, const std::string& id) const {
     fail("there is no node '{}'{}", id, did_you_mean(id, ids));
 }
 
+// An edit that says what is wanted becomes the document. Where it can, it is read at the nodes that it changes alone.
 void Document::apply(const Graph& wanted) {
     if (same_content(graph_, wanted)) return;
     for (bool surgical : {true, false}) {
-        Edit edit;
-        std::string text;
+        auto edit = std::make_shared<GraphEdit>();
         std::size_t at = 0;
         for (TextPatch& patch : patches_between(text_, *tree_, graph_, wanted, surgical)) {
             if (patch.position < at) break;  // overlapping patches; the comparison below notices
-            text.append(text_, at, patch.position - at).append(patch.inserted);
             at = patch.position + patch.length;
-            edit.push_back({patch.position, text_.substr(patch.position, patch.length),
-                            std::move(patch.inserted)});
+            edit->splices.push_back({patch.position, text_.substr(patch.position, patch.length),
+                                     std::move(patch.inserted)});
         }
-        text.append(text_, at);
+        std::string text = spliced(text_, edit->splices);
+        if (surgical && text.size() <= kMaximumGraphBytes)
+            if (auto items = items_of_edit(text_, *tree_, graph_, wanted, edit->splices)) {
+                edit->items = std::move(*items);
+                go(*edit, false);
+                return remember(std::move(edit));
+            }
         Document next{Parsed()};
         next.text_ = std::move(text);
         next.graph_.file = graph_.file;
@@ -184,17 +190,12 @@ void Document::apply(const Graph& wanted) {
             continue;
         }
         if (!same_content(next.graph_, wanted)) continue;
+        edit->before = std::make_shared<const ReadText>(ReadText{std::move(graph_), std::move(tree_)});
+        edit->after = std::make_shared<const ReadText>(ReadText{next.graph_, next.tree_});
         text_ = std::move(next.text_);
         graph_ = std::move(next.graph_);
         tree_ = std::move(next.tree_);
-        history_.resize(done_);
-        if (!step_open_) {
-            history_.emplace_back();
-            ++done_;
-            step_open_ = step_depth_ > 0;
-        }
-        history_.back().push_back(std::move(edit));
-        return;
+        return remember(std::move(edit));
     }
     fail("the change cannot be written into this text; write the node as 'key: value' lines first");
 }
@@ -343,38 +344,65 @@ void Document::set_editor(const std::string& key, const GraphParam::Yaml& value)
 // --- history
 // -----------------------------------------------------------------------------------------
 
+namespace {
+
+// Whole graphs are kept for the newest edits, as many as take about so much memory; older ones are read again from
+// their text. A graph and its tree take about so many times what the text does.
+constexpr std::size_t kWholeBytes = std::size_t(64) << 20, kBytesPerByteOfText = 100, kLeastWhole = 8;
+
+}  // namespace
+
+YamlNode& Document::own_tree() {
+    if (tree_.use_count() > 1) tree_ = std::make_shared<YamlNode>(*tree_);
+    return *tree_;
+}
+
+void Document::remember(EditPtr edit) {
+    if (edit->before) {
+        whole_.push_back(edit);
+        const std::size_t most = std::max(kLeastWhole, kWholeBytes / (kBytesPerByteOfText * (text_.size() + 1)));
+        if (whole_.size() > 2 * most) {  // the older half at once, so that each is moved but once
+            for (std::size_t i = 0; i < most; ++i)
+                if (EditPtr old = whole_[i].lock()) old->before = old->after = nullptr;
+            whole_.erase(whole_.begin(), whole_.begin() + std::ptrdiff_t(most));
+        }
+    }
+    history_.resize(done_);
+    if (!step_open_) {
+        history_.emplace_back();
+        ++done_;
+        step_open_ = step_depth_ > 0;
+    }
+    history_.back().push_back(std::move(edit));
+}
+
+// To the other side of an edit.
+void Document::go(const GraphEdit& edit, bool back) {
+    text_ = spliced(text_, edit.splices, back);
+    if (!edit.items.empty()) {
+        follow(edit, back, own_tree(), graph_);
+        assert(same_places(*tree_, Document::parse(text_).own_tree()) && "what was read in part is what the whole says");
+    } else if (const auto& whole = back ? edit.before : edit.after) {
+        std::filesystem::path file = std::move(graph_.file);
+        graph_ = whole->graph;
+        graph_.file = std::move(file);
+        tree_ = whole->tree;
+    } else {
+        read();
+    }
+}
+
 void Document::undo() {
     if (!can_undo()) return;
     step_open_ = false;
-    const std::vector<Edit>& step = history_[--done_];
-    for (auto edit = step.rbegin(); edit != step.rend(); ++edit) {
-        std::string text;
-        std::size_t at = 0;        // in text_
-        std::ptrdiff_t shift = 0;  // by which the edit moved what stands behind
-        for (const Splice& splice : *edit) {
-            std::size_t position = splice.position + std::size_t(shift);
-            text.append(text_, at, position - at).append(splice.removed);
-            at = position + splice.inserted.size();
-            shift += std::ptrdiff_t(splice.inserted.size()) - std::ptrdiff_t(splice.removed.size());
-        }
-        text_ = text.append(text_, at);
-    }
-    read();
+    const std::vector<EditPtr>& step = history_[--done_];
+    for (auto edit = step.rbegin(); edit != step.rend(); ++edit) go(**edit, true);
 }
 
 void Document::redo() {
     if (!can_redo()) return;
     step_open_ = false;
-    for (const Edit& edit : history_[done_++]) {
-        std::string text;
-        std::size_t at = 0;
-        for (const Splice& splice : edit) {
-            text.append(text_, at, splice.position - at).append(splice.inserted);
-            at = splice.position + splice.removed.size();
-        }
-        text_ = text.append(text_, at);
-    }
-    read();
+    for (const EditPtr& edit : history_[done_++]) go(*edit, false);
 }
 
 Document::Step::Step(Document& document) : document_(document) {

@@ -27,7 +27,8 @@ struct Problem {
     std::string text(const std::filesystem::path& file) const;
 };
 
-struct YamlNode;  // core/graph/yaml_tree.h
+struct YamlNode;   // core/graph/yaml_tree.h
+struct GraphEdit;  // core/graph/graph_edit.h
 
 // --- what the text says, before anything is known of node types -------------------------------
 
@@ -138,23 +139,22 @@ class Document {
     };
 
   private:
-    // An edit replaced these parts of the text, in rising order; positions are those before it.
-    struct Splice {
-        std::size_t position;
-        std::string removed, inserted;
-    };
-    using Edit = std::vector<Splice>;
+    using EditPtr = std::shared_ptr<GraphEdit>;
     struct Parsed {};
     explicit Document(Parsed) {}
 
     void read();
     void apply(const Graph& wanted);
+    void remember(EditPtr edit);
+    void go(const GraphEdit& edit, bool back);
+    YamlNode& own_tree();
     GraphNode& node_of(Graph& graph, const std::string& id) const;
 
     std::string text_;
     Graph graph_;
-    std::shared_ptr<const YamlNode> tree_;  // of text_; immutable, so copies of a document share it
-    std::vector<std::vector<Edit>> history_;  // undone steps stand behind done_
+    std::shared_ptr<YamlNode> tree_;  // of text_; copies share it until they change it
+    std::vector<std::vector<EditPtr>> history_;  // undone steps stand behind done_
+    std::vector<std::weak_ptr<GraphEdit>> whole_;  // edits that keep whole graphs, oldest first
     std::size_t done_ = 0;
     int step_depth_ = 0;
     bool step_open_ = false;  // the last step of the history takes further edits

@@ -522,10 +522,15 @@ std::string to_text(const Yaml& yaml) {
     return scalar(yaml.text);
 }
 
+bool same_node(const GraphNode& a, const GraphNode& b) { return same(a, b); }
+
+bool same_beside_nodes(const Graph& a, const Graph& b) {
+    return same_wires(a.outputs, b.outputs) && same(entries_of(a.editor), entries_of(b.editor));
+}
+
 bool same_content(const Graph& a, const Graph& b) {
-    return same_wires(a.outputs, b.outputs) && same(entries_of(a.editor), entries_of(b.editor)) &&
-           std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(),
-                      [](const GraphNode& x, const GraphNode& y) { return same(x, y); });
+    return same_beside_nodes(a, b) &&
+           std::equal(a.nodes.begin(), a.nodes.end(), b.nodes.begin(), b.nodes.end(), same_node);
 }
 
 std::vector<TextPatch> patches_between(const std::string& text, const YamlNode& root,

@@ -53,6 +53,11 @@ class GraphReader {
         return std::move(graph_);
     }
 
+    GraphNode read_one(const YamlNode& item) {
+        read_node(item);
+        return graph_.nodes.empty() ? GraphNode() : std::move(graph_.nodes.front());
+    }
+
     bool read_value(const YamlNode& value, GraphParam::Yaml& yaml, const std::string& key) {
         yaml.mark = value.mark;
         switch (value.kind) {
@@ -392,6 +397,10 @@ bool is_node_name(std::string_view name) {
 
 Graph read_graph(const YamlNode& root, std::vector<Problem>& problems) {
     return GraphReader(problems).read(root);
+}
+
+GraphNode read_graph_node(const YamlNode& item, std::vector<Problem>& problems) {
+    return GraphReader(problems).read_one(item);
 }
 
 bool parse_yaml_value(const std::string& text, GraphParam::Yaml& yaml) {

@@ -15,6 +15,13 @@ namespace voxloom {
 // tree's list of nodes.
 Graph read_graph(const YamlNode& root, std::vector<Problem>& problems);
 
+// The same of one item of the list of nodes; its id may be that of another one.
+GraphNode read_graph_node(const YamlNode& item, std::vector<Problem>& problems);
+
+// Parts of same_content().
+bool same_node(const GraphNode& a, const GraphNode& b);
+bool same_beside_nodes(const Graph& a, const Graph& b);
+
 // A value on its own ("[1, 2]", "0.5"), as on a command line; false where it is none.
 bool parse_yaml_value(const std::string& text, GraphParam::Yaml& yaml);
 

@@ -596,6 +596,90 @@ TEST(DocumentEdit, MakesOneStepOfSeveralInAScope) {
     EXPECT_FALSE(document.can_redo());
 }
 
+// Every place that messages name, in the order of the text.
+std::string marks_of(const Graph& graph) {
+    std::string text;
+    auto add = [&](const Mark& mark) { text += std::to_string(mark.line) + ":" + std::to_string(mark.column) + " "; };
+    std::function<void(const GraphParam::Yaml&)> add_yaml = [&](const GraphParam::Yaml& yaml) {
+        add(yaml.mark);
+        for (const auto& item : yaml.items) add_yaml(item);
+    };
+    auto add_params = [&](const std::vector<GraphParam>& params) {
+        for (const GraphParam& param : params) add(param.mark), add_yaml(param.yaml);
+    };
+    for (const WireEnd& end : graph.outputs) add(end.mark);
+    add_params(graph.editor);
+    for (const GraphNode& node : graph.nodes) {
+        add(node.mark), add(node.type_mark);
+        for (const GraphInput& input : node.inputs) {
+            add(input.mark);
+            for (const WireEnd& end : input.from) add(end.mark);
+        }
+        add_params(node.params);
+    }
+    return text;
+}
+
+TEST(DocumentEdit, KeepsMarksWhereThingsStandWhateverIsReadAgain) {
+    // Comments, several forms of nodes, block texts, and keys behind the nodes; edits that make lines more and fewer.
+    const std::string text =
+        "# begins\nvoxloom: 1\nnodes:\n  # the first\n  - id: a  # \u00fcber\n    type: t\n    set:\n      p: [1,\n        2]  # two\n"
+        "  - { id: b, type: t, in: { x: a.out } }\n  -\n    type: t\n    id: c\n    set:\n      text: |\n        some > lines\n        | more\n"
+        "  - id: d\n    type: t\neditor:\n  groups: [[G, a, b]]\noutputs: [a.out, d.out]\n";
+    for (const char* newline : {"\n", "\r\n"}) {
+        std::string with = text;
+        for (std::size_t at = 0; *newline == '\r' && (at = with.find('\n', at)) != std::string::npos; at += 2) with.replace(at, 1, newline);
+        Document document = Document::parse(with);
+        std::vector<std::string> texts{document.text()};
+        auto expect_marks = [&] { EXPECT_EQ(marks_of(document.graph()), marks_of(Document::parse(document.text()).graph())) << document.text(); };
+        auto edit = [&](auto&& f) {
+            f();
+            texts.push_back(document.text());
+            expect_marks();
+        };
+        edit([&] { document.set_param("a", "q", std::vector<double>(60, 0.125)); });
+        edit([&] { document.reset_param("a", "p"); });
+        edit([&] { document.move_nodes({{"a", {1, 2}}, {"b", {3, 4}}, {"d", {5, 6}}}); });
+        GraphNode e, f;
+        e.id = "e", f.id = "f", e.type = f.type = "t";
+        edit([&] { document.add_nodes({e, f}); });
+        edit([&] { document.connect("e", "out", "f", "x"); });
+        edit([&] { document.remove_node("b"); });
+        edit([&] { document.set_param("c", "text", std::string("short")); });
+        edit([&] { document.remove_nodes({"c", "e"}); });
+        edit([&] { document.rename_node("f", "g"); });
+        edit([&] { document.set_param("g", "lines", std::string("a\nb\u00fc")); });
+        edit([&] { document.remove_node("a"); });
+        edit([&] { document.set_editor("groups", {}); });
+        while (document.can_undo()) {
+            document.undo();
+            texts.pop_back();
+            EXPECT_EQ(document.text(), texts.back());
+            expect_marks();
+        }
+        while (document.can_redo()) {
+            document.redo();
+            expect_marks();
+        }
+    }
+}
+
+// Documents share what they read until one of them changes it.
+TEST(DocumentEdit, LeavesCopiesAsTheyAre) {
+    Document document = Document::parse(kGraph);
+    document.set_param("view", "step", 0.3);
+    Document copy = document;
+    document.undo();
+    document.set_param("view", "step", 0.4);
+    EXPECT_EQ(copy.graph().find("view")->params.back().yaml.text, Document::parse(copy.text()).graph().find("view")->params.back().yaml.text);
+    const std::string before = copy.text();
+    copy.undo();
+    EXPECT_EQ(copy.text(), kGraph);
+    copy.redo();
+    EXPECT_EQ(copy.text(), before);
+    EXPECT_EQ(marks_of(copy.graph()), marks_of(Document::parse(copy.text()).graph()));
+}
+
 // --- a long random sequence against a model
 // ------------------------------------------------------------
 
@@ -768,6 +852,9 @@ TEST(DocumentEdit, FollowsAModelThroughTenThousandRandomEdits) {
             ASSERT_TRUE(model_of(document.graph()) == model) << "edit " << i << "\n"
                                                              << text_before << "---\n"
                                                              << document.text();
+            if (i % 16 == 0) {
+                ASSERT_EQ(marks_of(document.graph()), marks_of(Document::parse(document.text()).graph()));
+            }
             if (document.text() != text_before) {
                 done.push_back(before);
                 undone.clear();
