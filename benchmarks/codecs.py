@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 
+from chart import write_chart
 from data import SOURCE, data_folder
 
 VOLUMES = ["engine", "cranium-ct", "turbulence-wmag"]
@@ -27,8 +28,6 @@ SLICES = "brick=[65535,65535,1]"
 CODECS = ["wavelet:coder=dense", "wavelet:coder=fast", "wavelet:coder=paper", "zfp", "blosc:coder=zstd", "blosc:coder=lz4",
           "jpeg2000", f"jpeg2000:{SLICES}", "jpegls", f"jpegls:{SLICES}", "jpegxl", f"jpegxl:{SLICES}", "raw"]
 TARGETS = ["40", "45", "50", "55", "60", "lossless"]
-COLORS = ["#1b6ca8", "#c0392b", "#27864a", "#8e44ad", "#d68910", "#17807e", "#7f5539", "#c2185b", "#555555", "#3949ab",
-          "#6a8d00", "#00838f", "#a04000"]
 
 
 def measure(build, volumes, codecs, targets, crop):
@@ -77,50 +76,17 @@ def table(rows):
     return lines
 
 
-def ticks(lo, hi):
-    """1, 2, 5, 10, ... between lo and hi."""
-    return [m * 10.0 ** e for e in range(math.floor(math.log10(lo)), math.ceil(math.log10(hi)) + 1) for m in (1, 2, 5)
-            if lo <= m * 10.0 ** e <= hi]
-
-
 def plot(rows, key, label, path):
-    """A panel a volume: `key` on a logarithmic axis against PSNR, a line a codec."""
+    """A panel a volume: PSNR over `key`, a line a codec."""
     rows = [r for r in rows if not math.isinf(psnr_of(r)) and r[key]]
-    if not rows:
-        return
-    volumes = list(dict.fromkeys(r["volume"] for r in rows))
-    codecs = list(dict.fromkeys(codec_of(r) for r in rows))
-    color = {c: COLORS[i % len(COLORS)] for i, c in enumerate(codecs)}
-    width, height, left, top = 460, 340, 56, 34
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{(width + left) * len(volumes) + 190}" height="{height + top + 50}" '
-           f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="white"/>']
-    for v, volume in enumerate(volumes):
-        mine = [r for r in rows if r["volume"] == volume]
-        lo, hi = min(r[key] for r in mine) / 1.15, max(r[key] for r in mine) * 1.15
-        bottom, ceiling = min(map(psnr_of, mine)) - 2, max(map(psnr_of, mine)) + 2
-        x0 = left + v * (width + left)
-        x = lambda value: x0 + (width - 20) * math.log(value / lo) / math.log(hi / lo)
-        y = lambda value: top + height * (ceiling - value) / (ceiling - bottom)
-        out.append(f'<text x="{x0}" y="20" font-weight="bold">{pathlib.Path(volume).stem}</text>')
-        for t in ticks(lo, hi):
-            out.append(f'<path d="M{x(t):.1f} {top}v{height}" stroke="#e4e4e4"/>'
-                       f'<text x="{x(t):.1f}" y="{top + height + 16}" text-anchor="middle">{t:g}</text>')
-        for t in range(math.ceil(bottom / 5) * 5, math.floor(ceiling) + 1, 5):
-            out.append(f'<path d="M{x0} {y(t):.1f}h{width - 20}" stroke="#e4e4e4"/>'
-                       f'<text x="{x0 - 6}" y="{y(t) + 4:.1f}" text-anchor="end">{t}</text>')
-        out.append(f'<rect x="{x0}" y="{top}" width="{width - 20}" height="{height}" fill="none" stroke="#888"/>'
-                   f'<text x="{x0 + width / 2 - 10}" y="{top + height + 36}" text-anchor="middle">{label}</text>')
-        for c in codecs:
-            points = sorted((psnr_of(r), r[key]) for r in mine if codec_of(r) == c)
-            line = " ".join(f"{x(value):.1f},{y(psnr):.1f}" for psnr, value in points)
-            out.append(f'<polyline points="{line}" fill="none" stroke="{color[c]}" stroke-width="1.6"/>')
-            out += [f'<circle cx="{x(value):.1f}" cy="{y(psnr):.1f}" r="3" fill="{color[c]}"/>' for psnr, value in points]
-    x0 = left + len(volumes) * (width + left) - 30
-    for i, c in enumerate(codecs):
-        out.append(f'<rect x="{x0}" y="{top + 18 * i}" width="14" height="4" fill="{color[c]}"/>'
-                   f'<text x="{x0 + 20}" y="{top + 18 * i + 7}">{c}</text>')
-    out.append(f'<text x="14" y="{top + height / 2}" transform="rotate(-90 14 {top + height / 2})" text-anchor="middle">PSNR, dB</text></svg>')
-    path.write_text("\n".join(out) + "\n")
+    panels = {}
+    for r in rows:
+        panels.setdefault(pathlib.Path(r["volume"]).stem, {}).setdefault(codec_of(r), []).append((r[key], psnr_of(r)))
+    for lines in panels.values():
+        for line in lines.values():
+            line.sort(key=lambda point: point[1])
+    if panels:
+        write_chart(path, panels, label, "PSNR, dB", y_step=5)
 
 
 def write(rows, command, folder):

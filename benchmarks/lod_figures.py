@@ -1,21 +1,26 @@
 #!/usr/bin/python3
 """Tables of level of detail, as docs/results/lod.md has them.
 
-promise    the error that a selection promises against the one that its picture has, for a steep and a nearly
-           linear transfer function
-sizes      cost of a picture of one size and one promised error against the size of the volume
-bricks     the same against the size of the bricks
+promise    the error that a selection promises against the one that its picture has, for steep and nearly linear
+           transfer functions; lod-promise.svg
+sizes      cost of a picture from within a volume, of one size and one error, against the size of the volume, beside
+           the count of Guthe et al., appendix; lod-sizes.svg
+bricks     cost and error against the size of the bricks
 turntable  what changes from frame to frame beside what changes at full resolution
 walk       a flight through a compressed CT with the settings of Guthe et al.: cost with and without caches, error
 plane      a cutting plane at the finest level against one that is fine about its middle, as in LaMar et al., table 1
+
+Tables go to standard output, charts to --charts. Compressed phantoms of sizes and walk are made once, in --volumes.
 """
 import argparse
 import csv
 import json
+import math
 import subprocess
 import tempfile
 from pathlib import Path
 
+from chart import write_chart
 from data import data_folder
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -24,53 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 def rows(file):
     with open(file, newline="", encoding="utf-8") as f:
         return list(csv.reader(f))
-
-
-def run(voxloom, settings):
-    """What one run says: bricks selected, promised error, measured RMSE and largest error, counters of the nodes."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder)
-        command = [voxloom, "run", ROOT / "graphs/selection.yaml", "--quiet", "--out", out, "--report", out / "report.json",
-                   "--output", "levels.table", "--output", "error.table"]
-        for name, value in {"detail.max_bricks": 1 << 20, "balanced.max_bricks": 0, **settings}.items():
-            command += ["--set", f"{name}={value}"]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        levels, error = rows(out / "levels.table.csv"), rows(out / "error.table.csv")
-        nodes = {n["id"]: n for n in json.loads((out / "report.json").read_text(encoding="utf-8"))["nodes"]}
-        of_error = dict(zip(error[0], error[1]))
-        return {"bricks": int(levels[-1][1]), "promised": float(levels[-1][-1]), "rmse": float(of_error["rmse"]),
-                "largest": float(of_error["max_error"]), "view": nodes["view"]["counters"], "full": nodes["full"]["counters"]}
-
-
-def promise(voxloom, errors):
-    print("| transfer function | asked for | promised, of the peak | bricks | RMSE | RMSE / promised | largest |")
-    print("|---|---|---|---|---|---|---|")
-    for preset in ("materials", "ramp"):
-        for error in errors:
-            r = run(voxloom, {"tf.preset": preset, "detail.max_error": error})
-            print(f"| {preset} | {error} | {r['promised']:.4f} | {r['bricks']} | {r['rmse']:.4f} | {r['rmse'] / r['promised']:.2f} "
-                  f"| {r['largest']:.3f} |", flush=True)
-
-
-def sizes(voxloom, all_sizes):
-    print("| N | bricks | of level 0 | MiB uploaded | of the dense volume | samples, million | dense | RMSE |")
-    print("|---|---|---|---|---|---|---|---|")
-    for n in all_sizes:
-        r = run(voxloom, {"tf.preset": "ramp", "detail.max_error": 0.01, "head.dims": f"[{n},{n},{n}]"})
-        view, full = r["view"], r["full"]
-        print(f"| {n} | {r['bricks']} | {(n + 15) // 16 * ((n + 15) // 16) ** 2} | {view['bytes uploaded'] / 2**20:.1f} "
-              f"| {full['bytes uploaded'] / 2**20:.1f} | {view['samples'] / 1e6:.1f} | {full['samples'] / 1e6:.1f} "
-              f"| {r['rmse']:.4f} |", flush=True)
-
-
-def bricks(voxloom):
-    print("| brick | bricks | pages | MiB uploaded | voxels of the selection, million | samples, million | promised | RMSE |")
-    print("|---|---|---|---|---|---|---|---|")
-    for k in (8, 16, 32):
-        r = run(voxloom, {"tf.preset": "ramp", "detail.max_error": 0.01, "pyramid.brick": f"[{k},{k},{k}]"})
-        view = r["view"]
-        print(f"| {k}³ | {r['bricks']} | {view['pages drawn']:.0f} | {view['bytes uploaded'] / 2**20:.1f} "
-              f"| {r['bricks'] * k**3 / 1e6:.1f} | {view['samples'] / 1e6:.1f} | {r['promised']:.4f} | {r['rmse']:.4f} |", flush=True)
 
 
 def run_graph(voxloom, out, nodes, outputs, *more):
@@ -90,6 +48,117 @@ def run_graph(voxloom, out, nodes, outputs, *more):
 def first_row(file):
     names, values = rows(file)[:2]
     return dict(zip(names, values))
+
+
+def selected(voxloom, policy, preset, error, brick=16):
+    """A picture of a selection: bricks, promised error, measured RMSE and largest error, the renderer's counters."""
+    aware = policy == "lod.transfer-aware"
+    sees = "bricks: pyramid.bricks, camera: camera.camera"
+    nodes = [("head", "readers.phantom", "", "kind: ct-head, dims: [192, 192, 192], type: u16"),
+             ("pyramid", "bricks.pyramid", "volume: head.volume", f"brick: [{brick}, {brick}, {brick}]"),
+             ("tf", "scene.transfer", "fit: head.volume", f"preset: {preset}"),
+             ("camera", "scene.camera", "fit: head.volume", "azimuth: 40, framing: box, zoom: 1.5"),
+             ("detail", policy, sees + (", transfer: tf.transfer" if aware else ""),
+              f"size: [320, 320], max_bricks: 1000000, max_error: {error}"),
+             ("balanced", "lod.balance", "bricks: pyramid.bricks, selection: detail.selection" + (", transfer: tf.transfer" if aware else ""),
+              "max_bricks: 0"),
+             ("levels", "lod.statistics", "selection: balanced.selection", ""),
+             ("view", "slicer.render", "source: pyramid.bricks, selection: balanced.selection, transfer: tf.transfer, camera: camera.camera",
+              "size: [320, 320]"),
+             ("full", "slicer.render", "source: head.volume, transfer: tf.transfer, camera: camera.camera", "size: [320, 320]"),
+             ("error", "metrics.image", "image: view.image, reference: full.image", "")]
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder)
+        report = run_graph(voxloom, out, nodes, ["levels.table", "error.table"])
+        levels, of_error = rows(out / "levels.table.csv"), first_row(out / "error.table.csv")
+        return {"bricks": int(levels[-1][1]), "promised": float(levels[-1][-1]), "rmse": float(of_error["rmse"]),
+                "largest": float(of_error["max_error"]), "view": report["view"]["counters"]}
+
+
+def promise(voxloom, errors, charts):
+    print("| selection | transfer function | asked for | promised, of the peak | bricks | RMSE | RMSE / promised | largest |")
+    print("|---|---|---|---|---|---|---|---|")
+    panels = {}
+    for policy in ("lod.priority", "lod.transfer-aware"):
+        for preset in ("materials", "ramp"):
+            lines = {"RMSE of the picture": [], "largest error": [], "as promised": []}
+            for error in errors:
+                r = selected(voxloom, policy, preset, error)
+                print(f"| `{policy}` | {preset} | {error} | {r['promised']:.4f} | {r['bricks']} | {r['rmse']:.4f} "
+                      f"| {r['rmse'] / r['promised']:.2f} | {r['largest']:.3f} |", flush=True)
+                for line, value in zip(lines.values(), (r["rmse"], r["largest"], r["promised"])):
+                    line.append((r["promised"], max(value, 1e-6)))
+            panels[f"{policy}, {preset}"] = {name: sorted(line) for name, line in lines.items()}
+    write_chart(charts / "lod-promise.svg", panels, "promised error, of the peak", "measured error, of the peak", y_log=True)
+
+
+def phantom(voxloom, dims, volumes):
+    """The file of a compressed phantom, made where it is not there yet."""
+    volumes.mkdir(parents=True, exist_ok=True)
+    file = volumes / f"ct-head-{'x'.join(map(str, dims))}.vxw"
+    if not file.exists():
+        with tempfile.TemporaryDirectory() as folder:
+            run_graph(voxloom, Path(folder),
+                      [("head", "readers.phantom", "", f"kind: ct-head, dims: {list(dims)}, type: u16"),
+                       ("encoded", "wavelet.encode", "volume: head.volume", "target: psnr, psnr: 50, coder: fast, brick: \"32\", memory: 1000"),
+                       ("file", "wavelet.write", "bricks: encoded.bricks", f"path: {file}")], ["file"])
+    return file
+
+
+def sizes(voxloom, all_sizes, volumes, charts):
+    """From the middle of a face, 90 degrees, 256 x 256: the scene of the appendix, where a voxel is a pixel 128 voxels away."""
+    print("| N | bricks of 32³ | Mvoxels selected | appendix: Mvoxels | MiB decoded | MiB uploaded | prepare, ms | draw, ms | samples, million "
+          "| file, MiB | RMSE |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    lines = {"Mvoxels selected": [], "appendix, Mvoxels in blocks": [], "MiB decoded": [], "MiB uploaded": [], "draw, 10 ms": []}
+    for n in all_sizes:
+        file = phantom(voxloom, (n, n, n), volumes)
+        middle = (n - 1) / 2
+        seen = "transfer: tf.transfer, camera: camera.camera"
+        nodes = [("open", "wavelet.open", "", f"path: {file}"),
+                 # As dense on the way through the volume whatever its size.
+                 ("tf", "scene.transfer", "fit: open.bricks",
+                  f"preset: ramp, ramp_start: 0.3, ramp_opacity: 0.3, reference_length: {n / 100}"),
+                 ("camera", "scene.camera", "fit: open.bricks",
+                  f"mode: look-at, eye: [{middle}, 0, {middle}], target: [{middle}, {n}, {middle}], fov: 90")]
+        # Finer than a pixel: the reference, where its bricks have room.
+        for name, pixels in (("", 1), ("fine", 0.5)):
+            nodes += [(f"detail{name}", "lod.projective", "bricks: open.bricks, camera: camera.camera", f"size: [256, 256], pixels: {pixels}"),
+                      (f"balanced{name}", "lod.balance", f"bricks: open.bricks, selection: detail{name}.selection", "max_bricks: 0"),
+                      (f"view{name}", "slicer.render", f"source: open.bricks, selection: balanced{name}.selection, {seen}",
+                       "size: [256, 256], gpu_memory: 2048")]
+        nodes += [("levels", "lod.statistics", "selection: balanced.selection", ""),
+                  ("error", "metrics.image", "image: view.image, reference: viewfine.image", "")]
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder)
+            report = run_graph(voxloom, out, nodes, ["view.image", "levels.table"])
+            cold, levels = report["view"]["counters"], rows(out / "levels.table.csv")
+            run_graph(voxloom, out, nodes, ["view.image"], "--repeat", "4", "--again", "view")
+            draw = min(json.loads((out / "report.json").read_text(encoding="utf-8"))["repeats"]["view"]["wall_seconds"][1:])
+            run_graph(voxloom, out, nodes, ["error.table"])
+            rmse = float(first_row(out / "error.table.csv")["rmse"])
+        # Layers of as many voxels as pixels, each so far behind the last as its voxels are apart, in blocks of 32.
+        far, near, rho = n, 128, 1 + math.sqrt(3) * 2 * 32 / 256
+        layers = max(math.log(far / near) / math.log1p(1 / 128), 0)
+        appendix = (layers * 65536 * 3.366 + 65536 * 128 / 3) * (rho * rho + rho + 1) / 3 / 1e6
+        bricks, voxels = int(levels[-1][1]), float(levels[-1][3]) / 1e6
+        decoded, uploaded = cold["bytes decoded"] / 2**20, cold["bytes uploaded"] / 2**20
+        print(f"| {n} | {bricks} | {voxels:.1f} | {appendix:.1f} | {decoded:.1f} | {uploaded:.1f} | {cold['prepare ms']:.0f} | {1e3 * draw:.0f} "
+              f"| {cold['samples'] / 1e6:.1f} | {file.stat().st_size / 2**20:.2f} | {rmse:.4f} |", flush=True)
+        for line, value in zip(lines.values(), (voxels, appendix, decoded, uploaded, 100 * draw)):
+            line.append((n, value))
+    write_chart(charts / "lod-sizes.svg", {"256 x 256 pixels from the middle of a face of N³": lines}, "N", "", x_ticks=all_sizes,
+                y_step=50, legend=220)
+
+
+def bricks(voxloom):
+    print("| brick | bricks | pages | MiB uploaded | voxels of the selection, million | samples, million | promised | RMSE |")
+    print("|---|---|---|---|---|---|---|---|")
+    for k in (8, 16, 32):
+        r = selected(voxloom, "lod.priority", "ramp", 0.01, k)
+        view = r["view"]
+        print(f"| {k}³ | {r['bricks']} | {view['pages drawn']:.0f} | {view['bytes uploaded'] / 2**20:.1f} "
+              f"| {r['bricks'] * k**3 / 1e6:.1f} | {view['samples'] / 1e6:.1f} | {r['promised']:.4f} | {r['rmse']:.4f} |", flush=True)
 
 
 def sweep_rows(out):
@@ -134,25 +203,31 @@ def turntable(voxloom, frames, step):
                   f"| {most('error', 'rmse'):.4f} | {most('error', 'max_error'):.3f} |", flush=True)
 
 
-def walk(voxloom, volume, frames):
+def walk(voxloom, volume, frames, volumes):
+    """Through a file of voxels, or a phantom of dims: that is compared with eight times finer bricks, as its whole has no room."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        run_graph(voxloom, out, [("ct", "readers.volume", "", f"path: {volume}"),
-                                 ("encoded", "wavelet.encode", "volume: ct.volume", "target: psnr, psnr: 50, coder: fast"),
-                                 ("file", "wavelet.write", "bricks: encoded.bricks", f"path: {out / 'ct.vxw'}")], ["file"])
-        print("| bricks, error | caches | select, ms | decode, upload, tables, ms | draw, ms | of full resolution's | bricks drawn | uploaded "
-              "| families decoded | RMSE, mean | worst |")
+        whole = isinstance(volume, Path)
+        file = out / "ct.vxw" if whole else phantom(voxloom, volume, volumes)
+        if whole:
+            run_graph(voxloom, out, [("ct", "readers.volume", "", f"path: {volume}"),
+                                     ("encoded", "wavelet.encode", "volume: ct.volume", "target: psnr, psnr: 50, coder: fast"),
+                                     ("file", "wavelet.write", "bricks: encoded.bricks", f"path: {file}")], ["file"])
+        print(f"| bricks, error | caches | select, ms | decode, upload, tables, ms | draw, ms | of {'full resolution' if whole else 'the reference'}'s "
+              "| bricks drawn | uploaded | families decoded | RMSE, mean | worst |")
         print("|---|---|---|---|---|---|---|---|---|---|---|")
         for most, error in ((512, 32), (1024, 64), (2048, 128)):
-            nodes = [("open", "wavelet.open", "", f"path: {out / 'ct.vxw'}"),
+            seen = "transfer: tf.transfer, camera: path.camera"
+            nodes = [("open", "wavelet.open", "", f"path: {file}"),
                      ("tf", "scene.transfer", "fit: open.bricks", "preset: ct-bone"),
                      ("path", "scene.path", "fit: open.bricks", "mode: walkthrough"),
                      ("detail", "lod.priority", "bricks: open.bricks, camera: path.camera",
                       f"size: [256, 256], max_bricks: {most}, max_error: {1 / error}"),
                      ("balanced", "lod.balance", "selection: detail.selection, bricks: open.bricks", f"max_bricks: {most}"),
-                     ("view", "slicer.render", "source: open.bricks, selection: balanced.selection, transfer: tf.transfer, "
-                      "camera: path.camera", "size: [256, 256]"),
-                     ("full", "slicer.render", "source: open.bricks, transfer: tf.transfer, camera: path.camera", "size: [256, 256]"),
+                     ("view", "slicer.render", f"source: open.bricks, selection: balanced.selection, {seen}", "size: [256, 256]"),
+                     ("fine", "lod.priority", "bricks: open.bricks, camera: path.camera",
+                      f"size: [256, 256], max_bricks: 8192, max_error: {1 / error / 8}"),
+                     ("full", "slicer.render", f"source: open.bricks, {'' if whole else 'selection: fine.selection, '}{seen}", "size: [256, 256]"),
                      ("error", "metrics.image", "image: view.image, reference: full.image", "")]
             steps = f"path.t=0..1..{1 / (frames - 1)}"
             run_graph(voxloom, out, nodes, ["error.table"], "--sweep", steps)
@@ -220,23 +295,27 @@ def main():
     parser.add_argument("figure", choices=["promise", "sizes", "bricks", "turntable", "walk", "plane"])
     parser.add_argument("--voxloom", default=ROOT / "build/release/bin/voxloom", help="the program to run")
     parser.add_argument("--errors", type=float, nargs="+", default=[0.08, 0.04, 0.02, 0.01, 0.005], help="max_error of promise")
-    parser.add_argument("--sizes", type=int, nargs="+", default=[128, 256, 384], help="voxels a side of sizes")
+    parser.add_argument("--sizes", type=int, nargs="+", default=[128, 256, 512, 1024, 2048], help="voxels a side of sizes")
     parser.add_argument("--frames", type=int, default=25, help="of turntable and walk")
     parser.add_argument("--step", type=float, default=1, help="degrees between two frames of turntable")
-    parser.add_argument("--volume", help="of walk; cranium-ct.nrrd of $VOXLOOM_DATA")
+    parser.add_argument("--volume", help="of walk: a file, or X,Y,Z of a phantom; cranium-ct.nrrd of $VOXLOOM_DATA")
+    parser.add_argument("--volumes", type=Path, default=ROOT / "out/phantoms", help="folder of compressed phantoms")
+    parser.add_argument("--charts", type=Path, default=ROOT / "docs/results", help="folder of charts")
     options = parser.parse_args()
     if options.figure == "promise":
-        promise(options.voxloom, options.errors)
+        promise(options.voxloom, options.errors, options.charts)
     elif options.figure == "sizes":
-        sizes(options.voxloom, options.sizes)
+        sizes(options.voxloom, options.sizes, options.volumes, options.charts)
     elif options.figure == "bricks":
         bricks(options.voxloom)
     elif options.figure == "turntable":
         turntable(options.voxloom, options.frames, options.step)
     elif options.figure == "walk":
-        if not options.volume and not data_folder():
+        volume = options.volume or data_folder() and data_folder() / "cranium-ct.nrrd"
+        if not volume:
             parser.error("walk needs --volume, or the real volumes in $VOXLOOM_DATA")
-        walk(options.voxloom, options.volume or data_folder() / "cranium-ct.nrrd", options.frames)
+        dims = str(volume).split(",")
+        walk(options.voxloom, tuple(map(int, dims)) if len(dims) == 3 else Path(volume), options.frames, options.volumes)
     else:
         plane(options.voxloom)
 

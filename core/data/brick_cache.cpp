@@ -342,7 +342,10 @@ BrickCache::State::Lease BrickCache::State::acquire(const BricksPtr& source, Bri
         if (!failure) {
             ++counters.families_decoded;
             [[maybe_unused]] const std::uint64_t others = counters.bytes;
-            for (DecodedBrick& brick : decoded) insert(identity, std::move(brick));
+            for (DecodedBrick& brick : decoded) {
+                counters.bytes_decoded += brick.voxels->bytes();
+                insert(identity, std::move(brick));
+            }
             assert(find(identity, next) && "refine() returns the brick it was asked for");
             assert(counters.bytes - others <= bytes && "family_bytes() is a bound");
         }

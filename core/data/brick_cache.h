@@ -19,7 +19,7 @@ class BrickCache {
   public:
     struct Counters {
         std::uint64_t hits = 0, misses = 0;      // bricks asked for: there at once, or not
-        std::uint64_t families_decoded = 0;
+        std::uint64_t families_decoded = 0, bytes_decoded = 0;
         std::uint64_t bricks_evicted = 0;
         std::uint64_t waits = 0;                 // misses that another thread was just decoding
         std::uint64_t bytes = 0, peak_bytes = 0; // held, and set aside for what is being decoded

@@ -67,7 +67,7 @@ class Atlas {
     // Of a brick that the last load() was asked for: the texel of its first own voxel. Of whole levels: of
     // any brick, whose values lie within its info().range where it was never asked for.
     glm::ivec3 texel_of(BrickId id) const;
-    // Smallest and largest value within `kReach` voxels of the brick's cells [lo, hi), in voxels from its
+    // Smallest and largest value within kReach voxels of level 0 of the brick's cells [lo, hi), in voxels from its
     // first; lo > hi where nothing is valid.
     glm::vec2 range_of(BrickId id, glm::ivec3 lo, glm::ivec3 hi) const;
     // Cells on the sides of the blocks that ranges are kept of.

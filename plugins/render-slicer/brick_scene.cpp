@@ -156,7 +156,7 @@ std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
 
 void load_atlas(BrickPlan& plan, const std::vector<WantedBrick>& wanted, const BrickRequest& request, Evaluation& ev) {
     for (;;) {
-        const std::uint64_t families = BrickCache::global().counters().families_decoded;
+        const BrickCache::Counters before = BrickCache::global().counters();
         const Atlas::Counters c = plan.atlas->load(plan.bricks, wanted, ev.stop(), [&](double f) {
             ev.progress(0.1 + 0.6 * f, "decoding and uploading bricks");
         });
@@ -164,7 +164,9 @@ void load_atlas(BrickPlan& plan, const std::vector<WantedBrick>& wanted, const B
         ev.count("bricks uploaded", double(c.uploaded));
         ev.count("bricks evicted", double(c.evicted));
         ev.count("bytes uploaded", double(c.bytes));
-        ev.count("families decoded", double(BrickCache::global().counters().families_decoded - families));
+        const BrickCache::Counters after = BrickCache::global().counters();
+        ev.count("families decoded", double(after.families_decoded - before.families_decoded));
+        ev.count("bytes decoded", double(after.bytes_decoded - before.bytes_decoded));
         if (!c.found_invalid || plan.atlas->texels().layout.validity || plan.bricks->desc().volume.color) return;
         // Seen for the first time: all texels get a channel for it.
         plan.atlas.reset();

@@ -119,9 +119,14 @@ void with_values(const Decoded& voxels, int from, const Use& use) {
     });
 }
 
-// What lies within kReach of the blocks of a brick that begins kReach behind the first of `voxels`: along x, then
+// kReach is of level 0; one voxel of it is what cubic kernels take of any level.
+glm::ivec3 reach_of(const BricksDesc& desc, int level) {
+    return (kReach - 2 + desc.levels[std::size_t(level)].stride) / desc.levels[std::size_t(level)].stride + 1;
+}
+
+// What lies within `reach` of the blocks of a brick that begins kReach behind the first of `voxels`: along x, then
 // of what that gives along y, then along z.
-std::vector<glm::vec2> ranges_of_blocks(const Decoded& voxels, int from, glm::ivec3 block, glm::ivec3 blocks) {
+std::vector<glm::vec2> ranges_of_blocks(const Decoded& voxels, int from, glm::ivec3 block, glm::ivec3 blocks, glm::ivec3 reach) {
     glm::ivec3 n = voxels.dims();
     std::vector<glm::vec2> ranges(voxels_in(n));
     with_values(voxels, from, [&](const auto& range_of) {
@@ -136,9 +141,9 @@ std::vector<glm::vec2> ranges_of_blocks(const Decoded& voxels, int from, glm::iv
             for (int y = 0; y < fewer.y; ++y)
                 for (int x = 0; x < fewer.x; ++x) {
                     glm::ivec3 first(x, y, z);
-                    first[axis] *= block[axis];
+                    first[axis] = first[axis] * block[axis] + kReach - reach[axis];
                     const glm::vec2* r = ranges.data() + index_in(n, first.x, first.y, first.z);
-                    const int count = std::min(block[axis] + 2 * kReach + 1, n[axis] - first[axis]);
+                    const int count = std::min(block[axis] + 2 * reach[axis] + 1, n[axis] - first[axis]);
                     glm::vec2& out = joined[index_in(fewer, x, y, z)];
                     for (int i = 0; i < count; ++i, r += stride) widen(out, *r);
                 }
@@ -234,6 +239,7 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
     if (out.gradients) mixing.apply(out.gradients, rows.gradients, 4, glm::vec4(1.0f / glm::vec3(ratio), 1.0f));  // per step of the brick's level
     if (out.colours) mixing.apply(&out.colours->x, &rows.colours->x, 4);
 
+    const glm::ivec3 reach = reach_of(desc, brick.level);
     // Each of the parent's voxels counts in the blocks that something is interpolated from it for.
     const glm::ivec3 n = voxels.dims();
     with_values(voxels, texels.layout.from, [&](const auto& range_of) {
@@ -243,8 +249,8 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
                     const Index3 at = (box.lo - Index3(kReach) + Index3(x, y, z)) * Index3(ratio) - first;  // in the brick
                     glm::ivec3 lo, hi;
                     for (int a = 0; a < 3; ++a) {
-                        lo[a] = std::max(0, int(floor_divided(at[a] - kReach - ratio[a], block[a])));
-                        hi[a] = std::min(blocks[a] - 1, int(floor_divided(at[a] + kReach + ratio[a], block[a])));
+                        lo[a] = std::max(0, int(floor_divided(at[a] - reach[a] - ratio[a], block[a])));
+                        hi[a] = std::min(blocks[a] - 1, int(floor_divided(at[a] + reach[a] + ratio[a], block[a])));
                     }
                     for (int bz = lo.z; bz <= hi.z; ++bz)
                         for (int by = lo.y; by <= hi.y; ++by)
@@ -269,7 +275,7 @@ FilledBrick fill_texels(const BricksPtr& bricks, BrickId brick, const std::array
     const Decoded voxels(bricks, brick.level, {first - Index3(kReach), first + Index3(size) + Index3(kReach)}, stop);
     FilledBrick filled;
     filled.found_invalid = write_texels(voxels, glm::ivec3(kReach - apron.below), size + apron.below + apron.above, texels, out);
-    filled.ranges = ranges_of_blocks(voxels, texels.layout.from, block, size / block);
+    filled.ranges = ranges_of_blocks(voxels, texels.layout.from, block, size / block, reach_of(bricks->desc(), brick.level));
     if (blends != std::array<CornerBlend, 8>{} && mix_parent_in(bricks, brick, blends, texels, apron, block, out, filled, stop))
         filled.found_invalid = true;
     return filled;

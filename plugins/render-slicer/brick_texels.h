@@ -32,7 +32,8 @@ struct WantedBrick {
     bool blends() const { return blend != CornerBlend{}; }
 };
 
-// Voxels around a brick that a square of pixels may meet together with it: known of are the values within.
+// Voxels of level 0 around a block that a square of pixels may meet together with it, and so many around a brick are
+// decoded.
 inline constexpr int kReach = 3;
 
 // Where the texels of a brick and its apron go, x fastest; null where they are not kept.
@@ -42,7 +43,7 @@ struct TexelRows {
     glm::vec4* colours;
 };
 struct FilledBrick {
-    // Smallest and largest value within kReach voxels of each block of `block` cells, x fastest; lo > hi where
+    // Smallest and largest value within that reach of each block of `block` cells, x fastest; lo > hi where
     // nothing is valid. Where the parent is mixed in, its values count as well.
     std::vector<glm::vec2> ranges;
     bool found_invalid = false;  // a value that is not finite
