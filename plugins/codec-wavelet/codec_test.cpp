@@ -344,7 +344,7 @@ TEST_F(WaveletFile, ComesBackAsItWasWritten) {
     for (int l = 0; l < int(made->desc().levels.size()); ++l) {
         EXPECT_EQ(decoded(opened, l), decoded(made, l));
         for (std::size_t i = 0; i < made->index().infos[std::size_t(l)].size(); ++i) {
-            const BrickInfo &a = made->index().infos[std::size_t(l)][i], &b = opened->index().infos[std::size_t(l)][i];
+            const BrickInfo a = made->index().info(l, i), b = opened->index().info(l, i);
             EXPECT_LE(b.range.min, a.range.min);
             EXPECT_GE(b.range.max, a.range.max);
             EXPECT_NEAR(a.range.min, b.range.min, outward);

@@ -102,7 +102,6 @@ TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload, std:
     TreeDesc& tree = index.tree;
     index.coder = make_coder(tree.coder, r.block());
     index.families.resize(tree.bricks.levels.size());
-    index.infos.resize(tree.bricks.levels.size());
     if (tree.empty()) return index;
     std::uint64_t offset = 0;
     for (int l = tree.top(); l >= 0; --l) {
@@ -117,16 +116,9 @@ TreeIndex read_head(std::span<const std::byte> head, std::uint64_t payload, std:
             if (place.size > payload - offset) fail("its index points beyond its end");
             offset += place.size;
         }
-        index.infos[std::size_t(l)].resize(std::size_t(grid_count(tree.bricks.levels[std::size_t(l)].bricks)));
-        for (std::size_t i = 0; i < families.size(); ++i) {
-            const auto bricks = bricks_of(tree, family_at(tree, l, std::int64_t(i)));
-            for (std::size_t b = 0; b < bricks.size(); ++b)
-                index.infos[std::size_t(l)][place_of(tree.bricks, bricks[b])].compressed_bytes =
-                    share_of(families[i].size, b, bricks.size());
-        }
     }
     if (offset != payload) fail("its index does not cover its data");
-    read_statistics(index, r, version);
+    index.statistics = read_statistics(tree.bricks, r, version);
     if (r.left() > 0) fail("its head is longer than it should be");
     return index;
 }

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "plugins/codec-wavelet/adaptive_number.h"
+#include "plugins/codec-wavelet/wavelet_bricks.h"
 
 namespace voxloom::wavelet {
 
@@ -25,30 +26,15 @@ std::uint16_t error_code(double error, bool up) {
 }
 double from_error_code(std::uint16_t code, double steps) { return code ? std::exp2(code / steps - 200) : 0; }
 
-// Values on 65536 levels from the smallest upwards; rounded outward.
-struct RangeScale {
-    double lo = 0, step = 1;
-    std::uint16_t below(double v) const {
-        auto code = std::int64_t(std::clamp(std::floor((v - lo) / step), 0.0, 65535.0));
-        while (code > 0 && value(code) > v) --code;
-        return std::uint16_t(code);
-    }
-    std::uint16_t above(double v) const {
-        auto code = std::int64_t(std::clamp(std::ceil((v - lo) / step), 0.0, 65535.0));
-        while (code < 65535 && value(code) < v) ++code;
-        return std::uint16_t(code);
-    }
-    double value(std::int64_t code) const { return lo + double(code) * step; }
-};
-
 // Exact for integers of 16 bits that lose nothing. Where values are wrong by the quantiser's step anyway, an
 // eighth of it is fine enough.
 RangeScale scale_of(const TreeIndex& index) {
     double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-    for (const auto& level : index.infos)
-        for (const BrickInfo& info : level) {
-            lo = std::min(lo, info.range.min);
-            hi = std::max(hi, info.range.max);
+    for (std::size_t l = 0; l < index.tree.bricks.levels.size(); ++l)
+        for (std::size_t i = 0; i < index.bricks_of_level(int(l)); ++i) {
+            const ValueRange range = index.info(int(l), i).range;
+            lo = std::min(lo, range.min);
+            hi = std::max(hi, range.max);
         }
     if (!(lo <= hi)) return {};
     RangeScale scale{lo, 1};
@@ -62,19 +48,13 @@ RangeScale scale_of(const TreeIndex& index) {
     return scale;
 }
 
-struct Codes {
-    // Smallest value, largest less smallest, L2 error, largest error less L2 error; modulo 2^16.
-    std::array<std::uint16_t, 4> number{};
-    std::array<std::uint8_t, 8> share{};  // of the octants, of the L2 error
-};
-
 class StatisticsCoding {
   public:
     explicit StatisticsCoding(const BricksDesc& desc) : desc_(desc) {}
 
     // Levels come from the coarsest to the finest. A decoder fills `codes`, which have their size already.
     template <class Coding>
-    void code_level(Coding& coding, int level, std::vector<Codes>& codes) {
+    void code_level(Coding& coding, int level, std::vector<BrickCodes>& codes) {
         const glm::i64vec3 n(desc_.levels[std::size_t(level)].bricks);
         for (auto& residuals : residuals_) residuals.assign(codes.size(), 0);
         std::size_t i = 0;
@@ -100,15 +80,15 @@ class StatisticsCoding {
     struct Nearby {
         std::array<std::size_t, 3> at{};  // bricks of the same level that are coded already
         std::size_t count = 0;
-        const Codes* parent = nullptr;
+        const BrickCodes* parent = nullptr;
         void add(std::size_t i) { at[count++] = i; }
     };
 
     // The middle of what stands around, or of the middle two.
-    static std::uint16_t predicted(std::size_t column, const Nearby& nearby, const std::vector<Codes>& codes) {
+    static std::uint16_t predicted(std::size_t column, const Nearby& nearby, const std::vector<BrickCodes>& codes) {
         std::array<std::int32_t, 4> values{};
         std::size_t n = 0;
-        const auto add = [&](const Codes& c) {  // in order
+        const auto add = [&](const BrickCodes& c) {  // in order
             const std::int32_t value = column == 3 ? std::int16_t(c.number[3]) : c.number[column];
             std::size_t k = n++;
             for (; k > 0 && values[k - 1] > value; --k) values[k] = values[k - 1];
@@ -121,7 +101,7 @@ class StatisticsCoding {
     }
 
     template <class Coding>
-    void code_number(Coding& coding, std::size_t column, std::size_t i, const Nearby& nearby, std::vector<Codes>& codes) {
+    void code_number(Coding& coding, std::size_t column, std::size_t i, const Nearby& nearby, std::vector<BrickCodes>& codes) {
         auto& residuals = residuals_[column];
         std::uint32_t around = 0;
         for (std::size_t k = 0; k < nearby.count; ++k) around += residuals[nearby.at[k]];
@@ -134,7 +114,7 @@ class StatisticsCoding {
 
     // What the octants before have left is shared equally, as far as anyone knows.
     template <class Coding>
-    void code_shares(Coding& coding, BrickId id, Codes& codes) {
+    void code_shares(Coding& coding, BrickId id, BrickCodes& codes) {
         int left = kShareSteps * kShareSteps;
         const auto children = desc_.finer(id);
         auto remaining = int(children.size());
@@ -157,7 +137,7 @@ class StatisticsCoding {
     std::array<AdaptiveNumber, 4> models_;
     AdaptiveNumber shares_;
     std::array<std::vector<std::uint32_t>, 4> residuals_;  // of this level: how far predictions were off
-    std::vector<Codes> above_;
+    std::vector<BrickCodes> above_;
 };
 
 // What versions before 4 had: for each level, finest first, columns of differences from the brick before.
@@ -172,11 +152,9 @@ std::vector<std::uint16_t> column_before_4(std::size_t count, ByteReader& reader
     }
     return column;
 }
-std::vector<std::vector<Codes>> codes_before_4(const TreeIndex& index, ByteReader& reader) {
-    std::vector<std::vector<Codes>> levels(index.infos.size());
+void read_codes_before_4(std::vector<std::vector<BrickCodes>>& levels, ByteReader& reader) {
     for (std::size_t l = 0; l < levels.size(); ++l) {
         auto& codes = levels[l];
-        codes.resize(index.infos[l].size());
         for (std::size_t column = 0; column < (l > 0 ? 12 : 4); ++column) {
             const auto values = column_before_4(codes.size(), reader);
             for (std::size_t i = 0; i < codes.size(); ++i) {
@@ -189,10 +167,33 @@ std::vector<std::vector<Codes>> codes_before_4(const TreeIndex& index, ByteReade
             }
         }
     }
-    return levels;
 }
 
 }  // namespace
+
+std::uint16_t RangeScale::below(double v) const {
+    auto code = std::int64_t(std::clamp(std::floor((v - lo) / step), 0.0, 65535.0));
+    while (code > 0 && value(code) > v) --code;
+    return std::uint16_t(code);
+}
+std::uint16_t RangeScale::above(double v) const {
+    auto code = std::int64_t(std::clamp(std::ceil((v - lo) / step), 0.0, 65535.0));
+    while (code < 65535 && value(code) < v) ++code;
+    return std::uint16_t(code);
+}
+
+BrickInfo CodedStatistics::info(int level, std::size_t brick) const {
+    const BrickCodes& c = levels[std::size_t(level)][brick];
+    BrickInfo info;
+    info.range.min = scale.value(c.number[0]);
+    info.range.max = scale.value(std::int64_t(c.number[0]) + c.number[1]);
+    info.l2 = from_error_code(c.number[2], error_steps);
+    info.max_error = from_error_code(std::uint16_t(c.number[3] + c.number[2]), error_steps);
+    if (level == 0) info.octant_l2[0] = info.l2;
+    for (std::size_t o = 0; o < 8 && level > 0; ++o) info.octant_l2[o] = info.l2 * c.share[o] / share_steps;
+    info.exact_error = true;
+    return info;
+}
 
 void write_statistics(const TreeIndex& index, ByteWriter& writer) {
     const RangeScale scale = scale_of(index);
@@ -201,54 +202,40 @@ void write_statistics(const TreeIndex& index, ByteWriter& writer) {
     Bytes part;
     RangeEncoder encoder(part);
     StatisticsCoding coding(index.tree.bricks);
-    for (std::size_t l = index.infos.size(); l-- > 0;) {
-        std::vector<Codes> codes(index.infos[l].size());
-        std::transform(index.infos[l].begin(), index.infos[l].end(), codes.begin(), [&](const BrickInfo& info) {
-            Codes c;
+    for (std::size_t l = index.tree.bricks.levels.size(); l-- > 0;) {
+        std::vector<BrickCodes> codes(index.bricks_of_level(int(l)));
+        for (std::size_t i = 0; i < codes.size(); ++i) {
+            const BrickInfo info = index.info(int(l), i);
+            BrickCodes& c = codes[i];
             c.number[0] = scale.below(info.range.min);
             c.number[1] = std::uint16_t(scale.above(info.range.max) - c.number[0]);
             c.number[2] = error_code(info.l2, false);
             c.number[3] = std::uint16_t(error_code(info.max_error, true) - c.number[2]);
             for (std::size_t o = 0; o < 8 && l > 0 && info.l2 > 0; ++o)
                 c.share[o] = std::uint8_t(std::lround(kShareSteps * info.octant_l2[o] / info.l2));
-            return c;
-        });
+        }
         coding.code_level(encoder, int(l), codes);
     }
     encoder.finish();
     writer.block(part);
 }
 
-void read_statistics(TreeIndex& index, ByteReader& reader, std::uint32_t version) {
-    RangeScale scale;
-    scale.lo = reader.number<double>();
-    scale.step = reader.number<double>();
-    std::vector<std::vector<Codes>> levels(index.infos.size());
+CodedStatistics read_statistics(const BricksDesc& desc, ByteReader& reader, std::uint32_t version) {
     const bool before_4 = version < 4;
+    CodedStatistics out;
+    out.scale.lo = reader.number<double>();
+    out.scale.step = reader.number<double>();
+    out.error_steps = before_4 ? kErrorStepsBefore4 : kErrorSteps;
+    out.share_steps = before_4 ? kShareStepsBefore4 : kShareSteps;
+    for (const LevelDesc& level : desc.levels) out.levels.emplace_back(Box::of(Index3(level.bricks)).voxels());
     if (before_4) {
-        levels = codes_before_4(index, reader);
-    } else {
-        RangeDecoder decoder(reader.block());
-        StatisticsCoding coding(index.tree.bricks);
-        for (std::size_t l = levels.size(); l-- > 0;) {
-            levels[l].resize(index.infos[l].size());
-            coding.code_level(decoder, int(l), levels[l]);
-        }
+        read_codes_before_4(out.levels, reader);
+        return out;
     }
-    const double error_steps = before_4 ? kErrorStepsBefore4 : kErrorSteps;
-    const double share_steps = before_4 ? kShareStepsBefore4 : kShareSteps;
-    for (std::size_t l = 0; l < levels.size(); ++l)
-        for (std::size_t i = 0; i < levels[l].size(); ++i) {
-            const Codes& c = levels[l][i];
-            BrickInfo& info = index.infos[l][i];
-            info.range.min = scale.value(c.number[0]);
-            info.range.max = scale.value(std::int64_t(c.number[0]) + c.number[1]);
-            info.l2 = from_error_code(c.number[2], error_steps);
-            info.max_error = from_error_code(std::uint16_t(c.number[3] + c.number[2]), error_steps);
-            if (l == 0) info.octant_l2[0] = info.l2;
-            for (std::size_t o = 0; o < 8 && l > 0; ++o) info.octant_l2[o] = info.l2 * c.share[o] / share_steps;
-            info.exact_error = true;
-        }
+    RangeDecoder decoder(reader.block());
+    StatisticsCoding coding(desc);
+    for (std::size_t l = out.levels.size(); l-- > 0;) coding.code_level(decoder, int(l), out.levels[l]);
+    return out;
 }
 
 }  // namespace voxloom::wavelet

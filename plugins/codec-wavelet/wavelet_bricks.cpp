@@ -1,5 +1,6 @@
 #include "plugins/codec-wavelet/wavelet_bricks.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include "core/base/byte_io.h"
@@ -67,13 +68,32 @@ std::uint64_t WaveletBricks::resident_bytes() const {
     std::uint64_t sum = payload_.resident;
     for (const auto& families : index_.families) sum += families.size() * sizeof(FamilyPlace);
     for (const auto& infos : index_.infos) sum += infos.size() * sizeof(BrickInfo);
+    for (const auto& codes : index_.statistics.levels) sum += codes.size() * sizeof(BrickCodes);
     return sum;
+}
+
+std::size_t TreeIndex::bricks_of_level(int level) const {
+    return Box::of(Index3(tree.bricks.levels[std::size_t(level)].bricks)).voxels();
+}
+
+// A family's bytes count for its bricks in equal parts.
+BrickInfo TreeIndex::info(int level, std::size_t brick) const {
+    if (!infos.empty()) return infos[std::size_t(level)][brick];
+    BrickInfo info = statistics.info(level, brick);
+    const glm::i64vec3 n(tree.bricks.levels[std::size_t(level)].bricks);
+    const auto i = std::int64_t(brick);
+    const BrickId id{level, glm::ivec3(i % n.x, i / n.x % n.y, i / (n.x * n.y))};
+    const FamilyId family = family_of(tree, id);
+    const std::vector<BrickId> bricks = bricks_of(tree, family);
+    const auto place = std::size_t(std::ranges::find(bricks, id) - bricks.begin());
+    const std::uint64_t all = families[std::size_t(level)][place_in(families_of(tree, level), family.index)].size;
+    info.compressed_bytes = share_of(all, place, bricks.size());
+    return info;
 }
 
 BrickInfo WaveletBricks::info(BrickId id) const {
     assert(desc().has(id));
-    const auto level = std::size_t(id.level);
-    return index_.infos[level][place_in(desc().levels[level].bricks, id.index)];
+    return index_.info(id.level, place_in(desc().levels[std::size_t(id.level)].bricks, id.index));
 }
 
 std::uint64_t WaveletBricks::family_bytes(BrickId id) const {

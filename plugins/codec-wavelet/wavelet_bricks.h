@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "plugins/codec-wavelet/payload.h"
+#include "plugins/codec-wavelet/statistics_code.h"
 #include "plugins/codec-wavelet/tree.h"
 
 namespace voxloom::wavelet {
@@ -21,7 +22,11 @@ struct TreeIndex {
     TreeDesc tree;
     std::unique_ptr<Coder> coder;
     std::vector<std::vector<FamilyPlace>> families;  // of each level, x fastest
-    std::vector<std::vector<BrickInfo>> infos;       // of each level's bricks, x fastest
+    std::vector<std::vector<BrickInfo>> infos;       // of each level's bricks, x fastest, as the encoder knows them ...
+    CodedStatistics statistics;                      // ... or, where infos are empty, as the file has them
+
+    std::size_t bricks_of_level(int level) const;
+    BrickInfo info(int level, std::size_t brick) const;
 };
 
 class WaveletBricks final : public Bricks {
@@ -43,7 +48,6 @@ class WaveletBricks final : public Bricks {
   private:
     // The bytes of the family of a brick, checked; those of one that is not stored read as empty streams.
     std::span<const std::byte> family_stream(BrickId id) const;
-
 
     TreeIndex index_;
     Payload payload_;
