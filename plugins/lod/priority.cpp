@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "core/base/error.h"
+#include "core/base/morton.h"
 
 namespace voxloom::lod {
 
@@ -16,14 +17,6 @@ double pixel_error(double squared, double voxels, double pixels_per_voxel) {
 }
 
 namespace {
-
-// Bits of x, y and z in turns, for a stable order of places.
-std::uint64_t morton(glm::ivec3 p) {
-    std::uint64_t code = 0;
-    for (int bit = 0; bit < 21; ++bit)
-        for (int a = 0; a < 3; ++a) code |= std::uint64_t(p[a] >> bit & 1) << (3 * bit + a);
-    return code;
-}
 
 // What the queue knows of a node beside the cut.
 struct Weights {

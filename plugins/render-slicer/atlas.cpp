@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/morton.h"
 #include "core/base/parallel.h"
 #include "core/gpu/thread.h"
 
@@ -208,6 +209,11 @@ Atlas::Counters Atlas::load(const BricksPtr& bricks, const std::vector<WantedBri
         else
             missing.push_back(brick);
     }
+    // What lies near each other, on whichever level, comes one after the other: it has ancestors and neighbours in common,
+    // which the cache of decoded bricks may have no room for until the end.
+    std::ranges::sort(missing, {}, [&](const WantedBrick& b) {
+        return std::pair(morton(b.id.index * bricks->desc().levels[std::size_t(b.id.level)].stride), -b.id.level);
+    });
     // A batch is decoded on all threads, then uploaded.
     constexpr std::size_t kBatch = 64;
     const gpu::TexelLayout& l = texels_.layout;
