@@ -2,6 +2,7 @@
 #include <optional>
 #include <thread>
 
+#include "core/base/priority.h"
 #include "core/graph/evaluate.h"
 
 namespace voxloom {
@@ -25,6 +26,7 @@ struct LiveRunner::State {
     State(ResultCache& c, RunObserver* o, Done d) : cache(c), observer(o), done(std::move(d)) {}
 
     void loop() {
+        give_way();
         std::unique_lock lock(mutex);
         for (;;) {
             changed.wait(lock, [&] { return next || ending; });

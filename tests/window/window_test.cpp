@@ -510,6 +510,39 @@ TEST_F(Window, theExampleOfCodecsIsDrawnAsItStandsInTheDocs) {
     keep(editor.screenshot(), "uncompressed");
 }
 
+// Only what changes is drawn; what comes of many changes is what is drawn at once.
+TEST_F(Window, whatIsDrawnInPartsIsWhatIsDrawnAsAWhole) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    editor.click("node:camera");
+    editor.drag("param:camera.azimuth", "param:camera.elevation");
+    editor.key("c");
+    editor.key("F1");
+    editor.with("help");
+    editor.key("F1");
+    editor.key("Tab");
+    editor.with("add-query");
+    editor.type("ph");
+    editor.key("Escape");
+    editor.drag("node:tf", "node:file");
+    editor.move_to("action:undo");
+    editor.move_to("canvas", 0.02, 0.98);
+    auto at_rest = [&] {
+        editor.idle();
+        editor.wait_for("no message", [](const json& s) { return s["message"] == ""; });
+        editor.idle();
+    };
+    at_rest();
+    const std::string in_parts = slurp(editor.screenshot());
+    at_rest();
+    for (int i = 0; i < 2; ++i) editor.key("t", "ctrl");  // everything has another colour
+    at_rest();
+    const fs::path whole = editor.screenshot();
+    EXPECT_TRUE(in_parts == slurp(whole));
+    keep(whole, "whole");
+}
+
 TEST_F(Window, everythingIsReadableOnALargeScreen) {
     VirtualDisplay display(2560, 1440);
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "2560x1440", "--scale", "1.5"});

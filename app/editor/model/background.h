@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/priority.h"
 
 namespace voxloom::editor {
 
@@ -76,6 +77,7 @@ class Background {
     }
 
     void loop(const std::stop_token& stop) {
+        give_way();
         std::unique_lock lock(mutex_);
         while (wake_.wait(lock, stop, [&] { return next() != nullptr; })) {
             const MadeOf of = next()->of;

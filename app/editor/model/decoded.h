@@ -12,7 +12,7 @@
 namespace voxloom::editor {
 
 struct Decoded {
-    double ratio = 0;             // bytes of the dense array a compressed byte
+    double ratio = 0;             // bytes of the dense array for each compressed one
     double bits_per_voxel = 0;
     double cpu_seconds = 0;       // of all threads, for every voxel of level 0 once
     double bytes_per_second = 0;  // of the dense array, in this time; infinite where it is 0

@@ -74,7 +74,7 @@ void draw_title(Editor& editor, std::size_t k, ImVec2 at, double column) {
 
 // The rows, with what their tooltips say.
 constexpr std::pair<const char*, const char*> kRows[] = {
-    {"ratio", "Bytes of the volume a compressed byte, everything included."},
+    {"ratio", "Bytes of the volume for each compressed byte, everything included."},
     {"bits per voxel", "Compressed bits a voxel, everything included."},
     {"PSNR, dB", "Of the decoded volume; the peak is the original's largest value minus its smallest."},
     {"max error", "The largest difference of a decoded voxel from the original."},

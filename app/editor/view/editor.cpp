@@ -290,7 +290,8 @@ void draw_message(Editor& editor) {
     }
     const Theme& t = theme();
     const ImVec2 screen = ImGui::GetIO().DisplaySize;
-    const ImVec2 text = ImGui::CalcTextSize(editor.message.c_str(), nullptr, false, ui(420));
+    const std::string message = wrapped(editor.message, std::min(ui(420), screen.x - ui(40)), t.body, t.body->FontSize);
+    const ImVec2 text = ImGui::CalcTextSize(message.c_str());
     const glm::dvec2 below = editor.canvas.lo + editor.canvas.size * glm::dvec2(0.5, 1);
     ImVec2 at = editor.message_is_error ? ImGui::GetMousePos()
                                         : ImVec2(float(below.x) - text.x / 2 - ui(12), float(below.y) - ui(34) - text.y);
@@ -300,7 +301,7 @@ void draw_message(Editor& editor) {
     const ImVec2 hi{at.x + text.x + ui(24), at.y + text.y + ui(16)};
     list.AddRectFilled(at, hi, t.node, ui(6));
     list.AddRect(at, hi, editor.message_is_error ? t.bad : t.accent, ui(6));
-    list.AddText(t.body, t.body->FontSize, {at.x + ui(12), at.y + ui(8)}, t.text, editor.message.c_str(), nullptr, ui(420));
+    list.AddText(t.body, t.body->FontSize, {at.x + ui(12), at.y + ui(8)}, t.text, message.c_str());
     mark(editor, "message", at, hi);
 }
 

@@ -26,7 +26,11 @@ const Image* image_in(const LiveValue* value) {
 }  // namespace
 
 void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
-    if (!picture.texture) glGenTextures(1, &picture.texture);
+    // Under another name than before: what draws it is told from what drew the one before.
+    GLuint texture = 0;
+    glGenTextures(1, &texture);
+    if (picture.texture) glDeleteTextures(1, &picture.texture);
+    picture.texture = texture;
     GLint before = 0;
     glGetIntegerv(GL_TEXTURE_BINDING_2D, &before);
     glBindTexture(GL_TEXTURE_2D, picture.texture);
@@ -119,17 +123,18 @@ SmallPicture* small_picture(Editor& editor, const std::string& node, const NodeP
     return nullptr;
 }
 
-std::string pixel_text(const Image& image, glm::dvec2 at, const Camera* camera) {
+std::vector<std::string> pixel_texts(const Image& image, glm::dvec2 at, const Camera* camera) {
     const glm::ivec2 p(glm::floor(at));
     if (p.x < 0 || p.y < 0 || p.x >= image.size().x || p.y >= image.size().y) return {};
     const glm::vec4 c = image.at(p.x, p.y);
-    std::string text = fmt::format("({}, {})  {:.3f} {:.3f} {:.3f} {:.3f}", p.x, p.y, c.r, c.g, c.b, c.a);
-    if (image.depth.empty() || !camera) return text;
+    std::vector<std::string> texts{fmt::format("({}, {})", p.x, p.y), fmt::format("{:.3f} {:.3f} {:.3f} {:.3f}", c.r, c.g, c.b, c.a)};
+    if (image.depth.empty() || !camera) return texts;
     const float depth = image.depth[std::size_t(p.y) * std::size_t(image.size().x) + std::size_t(p.x)];
-    if (!std::isfinite(depth) || depth <= 0) return text;
+    if (!std::isfinite(depth) || depth <= 0) return texts;
     const Ray ray = camera->ray(p.x + 0.5, p.y + 0.5, image.size().x, image.size().y);
     const glm::dvec3 world = ray.origin + ray.direction * (depth / glm::dot(ray.direction, camera->forward()));
-    return text + fmt::format("  at {:.4g} {:.4g} {:.4g}", world.x, world.y, world.z);
+    texts.push_back(fmt::format("at {:.4g} {:.4g} {:.4g}", world.x, world.y, world.z));
+    return texts;
 }
 
 }  // namespace voxloom::editor

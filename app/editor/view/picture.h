@@ -24,7 +24,7 @@ bool draw_plane_gizmo(Editor& editor, const WireEnd& port, const Camera* camera,
 
 // Opaque, over black where the picture is transparent. Not a number is black.
 std::vector<glm::u8vec4> pixels_of(const Image& image);
-// "(3, 4)  0.1 0.2 0.3 1": what a pixel is, and where in the world what it shows. Empty outside.
-std::string pixel_text(const Image& image, glm::dvec2 at, const Camera* camera);
+// "(3, 4)", "0.1 0.2 0.3 1", "at 1 2 3": what a pixel is, and where in the world what it shows. Empty outside.
+std::vector<std::string> pixel_texts(const Image& image, glm::dvec2 at, const Camera* camera);
 
 }  // namespace voxloom::editor

@@ -188,4 +188,21 @@ std::string shortened(const std::string& text, float width, ImFont* font, float 
     return cut + "…";
 }
 
+std::string wrapped(const std::string& text, float width, ImFont* font, float size) {
+    auto width_of = [&](const std::string& line) { return font->CalcTextSizeA(size, FLT_MAX, 0, line.c_str()).x; };
+    std::string all, line;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t end = std::min(text.find_first_of(" /\n", at), text.size() - 1) + 1;
+        const std::string word = text.substr(at, end - at);
+        if (!line.empty() && width_of(line + word) > width) {
+            all += line + "\n";
+            line.clear();
+        }
+        line += word;
+        if (word.back() == '\n') all += std::exchange(line, {});
+        at = end;
+    }
+    return all + line;
+}
+
 }  // namespace voxloom::editor

@@ -40,5 +40,7 @@ void tooltip(const std::string& text);  // for the last item, when hovered, wrap
 
 // The text cut to `width` pixels, with an ellipsis where something is missing.
 std::string shortened(const std::string& text, float width, ImFont* font, float size);
+// With line breaks at spaces and behind slashes, so that lines are at most so wide where their words are.
+std::string wrapped(const std::string& text, float width, ImFont* font, float size);
 
 }  // namespace voxloom::editor

@@ -142,13 +142,22 @@ std::string caption(const Editor& editor, const WireEnd& port, const LiveValue& 
     return text;
 }
 
-void draw_caption(glm::dvec2 lo, glm::dvec2 size, const std::string& text, bool fresh) {
+// Parts beside each other as far as there is room, else below each other.
+void draw_caption(glm::dvec2 lo, glm::dvec2 size, const std::vector<std::string>& parts, bool fresh) {
     ImDrawList& list = *ImGui::GetWindowDrawList();
-    const std::string cut = shortened(text, float(size.x) - ui(32), theme().body, theme().body->FontSize);
-    const ImVec2 extent = ImGui::CalcTextSize(cut.c_str());
+    const float room = float(size.x) - ui(32);
+    std::vector<std::string> lines;
+    for (const std::string& part : parts) {
+        const std::string longer = lines.empty() ? part : lines.back() + "   " + part;
+        if (lines.empty() || ImGui::CalcTextSize(longer.c_str()).x > room) lines.push_back(part);
+        else lines.back() = longer;
+    }
+    for (std::string& line : lines) line = shortened(line, room, theme().body, theme().body->FontSize);
+    const std::string text = join(lines, "\n");
+    const ImVec2 extent = ImGui::CalcTextSize(text.c_str());
     const ImVec2 at = im(lo + glm::dvec2(ui(12), size.y - extent.y - ui(10)));
     list.AddRectFilled({at.x - ui(6), at.y - ui(3)}, {at.x + extent.x + ui(6), at.y + extent.y + ui(3)}, IM_COL32(0, 0, 0, 150), ui(4));
-    list.AddText(at, fresh ? IM_COL32(205, 210, 218, 255) : theme().warn, cut.c_str());
+    list.AddText(at, fresh ? IM_COL32(205, 210, 218, 255) : theme().warn, text.c_str());
 }
 
 std::string text_of(const Table::Cell& cell) {
@@ -260,15 +269,15 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     }
     const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, port.node));
     draw_plane_gizmo(editor, port, camera, lo, hi, hovered);
-    std::string text = view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
-                                                     : caption(editor, port, *value, picture->size);
+    std::vector<std::string> texts{view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
+                                                                 : caption(editor, port, *value, picture->size)};
     if (hovered && view.mode != Mode::difference) {
         const ImagePtr& image = std::get<ImagePtr>(value->value);
         const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image->size());
-        if (std::string pixel = pixel_text(*image, at, camera); !pixel.empty()) text += "   " + pixel;
+        for (std::string& part : pixel_texts(*image, at, camera)) texts.push_back(std::move(part));
         ask_what_is_seen(editor, port, *value, image, at);
     }
-    draw_caption(cell.lo, cell.size, text, value->fresh);
+    draw_caption(cell.lo, cell.size, texts, value->fresh);
     list.PopClipRect();
 }
 

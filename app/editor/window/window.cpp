@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "app/editor/view/picture.h"
+#include "app/editor/window/kept_frame.h"
 #include "app/editor/window/screen_file.h"
 #include "core/base/error.h"
 #include "core/base/output_file.h"
@@ -139,7 +140,8 @@ bool is_restless(const Editor& editor) {
     return !editor.message.empty() || editor.autosave.due() || editor.viewport.mode == Viewport::Mode::flicker;
 }
 
-void draw_frame(Editor& editor, GLFWwindow* window) {
+// False where it is the picture that is on the screen already.
+bool draw_frame(Editor& editor, GLFWwindow* window, KeptFrame& kept) {
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
@@ -147,20 +149,22 @@ void draw_frame(Editor& editor, GLFWwindow* window) {
     ImGui::Render();
     glm::ivec2 size;
     glfwGetFramebufferSize(window, &size.x, &size.y);
-    glViewport(0, 0, size.x, size.y);
-    // The canvas has this colour, and is not drawn again.
-    const ImVec4 clear = ImGui::ColorConvertU32ToFloat4(theme().canvas);
-    glClearColor(clear.x, clear.y, clear.z, 1);
-    glClear(GL_COLOR_BUFFER_BIT);
-    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    if (editor.screenshot_wanted && !kept.keeps()) kept.forget();
+    // The canvas has the colour of what is behind it, and is not drawn again.
+    const bool changed = kept.draw(*ImGui::GetDrawData(), size, ImGui::ColorConvertU32ToFloat4(theme().canvas));
     take_wanted_pictures(editor, size);
-    glfwSwapBuffers(window);
+    if (changed) kept.show();
+    return changed;
 }
 
 }  // namespace
 
 int run_window(const EditArguments& arguments, const Registry& registry) {
     Window window(arguments);
+    KeptFrame kept(window.get());
+    // What the system has thrown away of the window is drawn again.
+    glfwSetWindowUserPointer(window.get(), &kept);
+    glfwSetWindowRefreshCallback(window.get(), [](GLFWwindow* w) { static_cast<KeptFrame*>(glfwGetWindowUserPointer(w))->forget(); });
     // Editors hold textures of the window's context, so they end before it.
     Editor editor(registry, settings_file(), [] { glfwPostEmptyEvent(); });
     editor.output_folder = arguments.out;
@@ -190,9 +194,11 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
             unless_changed(editor, [&editor] { editor.quit = true; });
         }
         const double begun = glfwGetTime(), cpu_begun = thread_cpu_seconds();
-        if (editor.theme_changed) set_theme(editor, screen_scale);
-        draw_frame(editor, window.get());
-        remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
+        if (editor.theme_changed) {
+            set_theme(editor, screen_scale);
+            kept.forget();
+        }
+        if (draw_frame(editor, window.get(), kept)) remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
         if (!arguments.screen.empty()) write_screen(editor, arguments.screen);
         // Software renderers do not wait for the screen.
         if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && spare > 0)
