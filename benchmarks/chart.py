@@ -13,23 +13,30 @@ def ticks(lo, hi):
             if lo <= m * 10.0 ** e <= hi]
 
 
+def round_step(extent):
+    """1, 2 or 5 times a power of ten, for some eight ticks."""
+    rough = (extent or 1) / 8
+    power = 10.0 ** math.floor(math.log10(rough))
+    return min((m * power for m in (1, 2, 5, 10)), key=lambda step: abs(step - rough))
+
+
 class Axis:
     """From values to pixels, a margin around all of them."""
 
-    def __init__(self, values, logarithmic, begin, end, at=None, step=None):
+    def __init__(self, values, logarithmic, begin, end, at=None):
         lo, hi = min(values), max(values)
         if logarithmic:
             lo, hi = lo / 1.15, hi * 1.15
             self.place = lambda v: begin + (end - begin) * math.log(v / lo) / math.log(hi / lo)
             self.ticks = [v for v in at or ticks(lo, hi) if lo <= v <= hi]
         else:
-            step = step or 10.0 ** math.floor(math.log10((hi - lo) or 1))
+            step = round_step(hi - lo)
             lo, hi = lo - 0.4 * step, hi + 0.4 * step
             self.place = lambda v: begin + (end - begin) * (v - lo) / (hi - lo)
             self.ticks = [k * step for k in range(math.ceil(lo / step), math.floor(hi / step) + 1)]
 
 
-def write_chart(path, panels, x_label, y_label, x_log=True, y_log=False, x_ticks=None, y_step=None, legend=150):
+def write_chart(path, panels, x_label, y_label, x_log=True, y_log=False, x_ticks=None, legend=150):
     """panels: {title: {line: [(x, y), ...]}}; the lines' colours are by their order in all panels. `legend`: its width."""
     names = list(dict.fromkeys(name for lines in panels.values() for name in lines))
     color = {name: COLORS[i % len(COLORS)] for i, name in enumerate(names)}
@@ -40,7 +47,7 @@ def write_chart(path, panels, x_label, y_label, x_log=True, y_log=False, x_ticks
         x0 = LEFT + i * (WIDTH + LEFT)
         points = [p for line in lines.values() for p in line]
         x = Axis([p[0] for p in points], x_log, x0, x0 + WIDTH, x_ticks)
-        y = Axis([p[1] for p in points], y_log, TOP + HEIGHT, TOP, step=y_step)
+        y = Axis([p[1] for p in points], y_log, TOP + HEIGHT, TOP)
         out.append(f'<text x="{x0}" y="20" font-weight="bold">{title}</text>')
         out += [f'<path d="M{x.place(t):.1f} {TOP}v{HEIGHT}" stroke="#e4e4e4"/>'
                 f'<text x="{x.place(t):.1f}" y="{TOP + HEIGHT + 16}" text-anchor="middle">{t:g}</text>' for t in x.ticks]

@@ -86,7 +86,7 @@ def plot(rows, key, label, path):
         for line in lines.values():
             line.sort(key=lambda point: point[1])
     if panels:
-        write_chart(path, panels, label, "PSNR, dB", y_step=5)
+        write_chart(path, panels, label, "PSNR, dB")
 
 
 def write(rows, command, folder):

@@ -81,15 +81,15 @@ def promise(voxloom, errors, charts):
     panels = {}
     for policy in ("lod.priority", "lod.transfer-aware"):
         for preset in ("materials", "ramp"):
-            lines = {"RMSE of the picture": [], "largest error": [], "as promised": []}
+            lines = {"promised": [], "RMSE of the picture": [], "largest error": []}
             for error in errors:
                 r = selected(voxloom, policy, preset, error)
                 print(f"| `{policy}` | {preset} | {error} | {r['promised']:.4f} | {r['bricks']} | {r['rmse']:.4f} "
                       f"| {r['rmse'] / r['promised']:.2f} | {r['largest']:.3f} |", flush=True)
-                for line, value in zip(lines.values(), (r["rmse"], r["largest"], r["promised"])):
-                    line.append((r["promised"], max(value, 1e-6)))
-            panels[f"{policy}, {preset}"] = {name: sorted(line) for name, line in lines.items()}
-    write_chart(charts / "lod-promise.svg", panels, "promised error, of the peak", "measured error, of the peak", y_log=True)
+                for line, value in zip(lines.values(), (r["promised"], r["rmse"], r["largest"])):
+                    line.append((error, max(value, 1e-6)))
+            panels[f"{policy}, {preset}"] = lines
+    write_chart(charts / "lod-promise.svg", panels, "max_error asked for", "error, of the peak", y_log=True)
 
 
 def phantom(voxloom, dims, volumes):
@@ -110,7 +110,7 @@ def sizes(voxloom, all_sizes, volumes, charts):
     print("| N | bricks of 32³ | Mvoxels selected | appendix: Mvoxels | MiB decoded | MiB uploaded | prepare, ms | draw, ms | samples, million "
           "| file, MiB | RMSE |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
-    lines = {"Mvoxels selected": [], "appendix, Mvoxels in blocks": [], "MiB decoded": [], "MiB uploaded": [], "draw, 10 ms": []}
+    lines = {"Mvoxels selected": [], "appendix, Mvoxels in blocks": [], "10 MiB decoded": [], "MiB uploaded": [], "draw, 10 ms": []}
     for n in all_sizes:
         file = phantom(voxloom, (n, n, n), volumes)
         middle = (n - 1) / 2
@@ -145,10 +145,10 @@ def sizes(voxloom, all_sizes, volumes, charts):
         decoded, uploaded = cold["bytes decoded"] / 2**20, cold["bytes uploaded"] / 2**20
         print(f"| {n} | {bricks} | {voxels:.1f} | {appendix:.1f} | {decoded:.1f} | {uploaded:.1f} | {cold['prepare ms']:.0f} | {1e3 * draw:.0f} "
               f"| {cold['samples'] / 1e6:.1f} | {file.stat().st_size / 2**20:.2f} | {rmse:.4f} |", flush=True)
-        for line, value in zip(lines.values(), (voxels, appendix, decoded, uploaded, 100 * draw)):
+        for line, value in zip(lines.values(), (voxels, appendix, decoded / 10, uploaded, 100 * draw)):
             line.append((n, value))
     write_chart(charts / "lod-sizes.svg", {"256 x 256 pixels from the middle of a face of N³": lines}, "N", "", x_ticks=all_sizes,
-                y_step=50, legend=220)
+                legend=220)
 
 
 def bricks(voxloom):

@@ -132,12 +132,12 @@ std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
     std::unordered_map<BrickId, bool, HashOfBrickId> known;
     auto is_there = [&](BrickId id) {
         const auto [it, is_new] = known.try_emplace(id, false);
-        if (is_new) it->second = plan.atlas->has({id}) || is_decoded(*plan.bricks, id, kReach);
+        if (is_new) it->second = plan.atlas->has({id}) || is_decoded(*plan.bricks, id, kAround);
         return it->second;
     };
     auto is_mixed = [&](const WantedBrick& brick) {
-        return plan.atlas->has(brick) || (is_decoded(*plan.bricks, brick.id, kReach) &&
-                                          is_decoded(*plan.bricks, *plan.bricks->desc().coarser(brick.id), kReach));
+        return plan.atlas->has(brick) || (is_decoded(*plan.bricks, brick.id, kAround) &&
+                                          is_decoded(*plan.bricks, *plan.bricks->desc().coarser(brick.id), kAround));
     };
     std::vector<Page> pages = plan.pages;
     for (Page& p : pages) {

@@ -124,33 +124,55 @@ glm::ivec3 reach_of(const BricksDesc& desc, int level) {
     return (kReach - 2 + desc.levels[std::size_t(level)].stride) / desc.levels[std::size_t(level)].stride + 1;
 }
 
-// What lies within `reach` of the blocks of a brick that begins kReach behind the first of `voxels`: along x, then
-// of what that gives along y, then along z.
-std::vector<glm::vec2> ranges_of_blocks(const Decoded& voxels, int from, glm::ivec3 block, glm::ivec3 blocks, glm::ivec3 reach) {
+// Along one axis, the voxels [first, first + count) that matter to each block.
+struct Window {
+    int first, count;
+};
+using Windows = std::array<std::vector<Window>, 3>;
+
+// What lies in the windows of each block: along x, then of what that gives along y, then along z.
+std::vector<glm::vec2> ranges_in(const Decoded& voxels, int from, const Windows& windows) {
     glm::ivec3 n = voxels.dims();
     std::vector<glm::vec2> ranges(voxels_in(n));
     with_values(voxels, from, [&](const auto& range_of) {
         for (std::size_t i = 0; i < ranges.size(); ++i) ranges[i] = range_of(i);
     });
     for (int axis = 0; axis < 3; ++axis) {
+        const std::vector<Window>& along = windows[std::size_t(axis)];
         glm::ivec3 fewer = n;
-        fewer[axis] = blocks[axis];
+        fewer[axis] = int(along.size());
         const std::size_t stride = index_in(n, axis == 0, axis == 1, axis == 2);
         std::vector<glm::vec2> joined(voxels_in(fewer), kNothing);
         for (int z = 0; z < fewer.z; ++z)
             for (int y = 0; y < fewer.y; ++y)
                 for (int x = 0; x < fewer.x; ++x) {
-                    glm::ivec3 first(x, y, z);
-                    first[axis] = first[axis] * block[axis] + kReach - reach[axis];
-                    const glm::vec2* r = ranges.data() + index_in(n, first.x, first.y, first.z);
-                    const int count = std::min(block[axis] + 2 * reach[axis] + 1, n[axis] - first[axis]);
+                    glm::ivec3 at(x, y, z);
+                    const Window& window = along[std::size_t(at[axis])];
+                    at[axis] = window.first;
+                    const glm::vec2* r = ranges.data() + index_in(n, at.x, at.y, at.z);
                     glm::vec2& out = joined[index_in(fewer, x, y, z)];
-                    for (int i = 0; i < count; ++i, r += stride) widen(out, *r);
+                    for (int i = 0; i < window.count; ++i, r += stride) widen(out, *r);
                 }
         ranges = std::move(joined);
         n = fewer;
     }
     return ranges;
+}
+
+std::int64_t floor_divided(std::int64_t a, std::int64_t b) { return (a >= 0 ? a : a - b + 1) / b; }
+
+// What is interpolated within `reach` of the blocks of a brick comes from these voxels of a level that is `ratio` times
+// as coarse; the brick begins at `first` of its own level, `box` is what there is of theirs.
+Windows windows_of_blocks(Index3 first, glm::ivec3 block, glm::ivec3 blocks, glm::ivec3 reach, glm::ivec3 ratio, const Box& box) {
+    Windows windows;
+    for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < blocks[a]; ++b) {
+            const std::int64_t lo = first[a] + b * block[a] - reach[a], hi = lo + block[a] + 2 * reach[a];
+            const std::int64_t from = std::max(floor_divided(lo, ratio[a]), box.lo[a]);
+            const std::int64_t end = std::min(1 - floor_divided(-hi, ratio[a]), box.hi[a]);
+            windows[std::size_t(a)].push_back({int(from - box.lo[a]), int(end - from)});
+        }
+    return windows;
 }
 
 // --- mixing in the parent ------------------------------------------------------------------------
@@ -201,14 +223,11 @@ struct Mixing {
     }
 };
 
-std::int64_t floor_divided(std::int64_t a, std::int64_t b) { return (a >= 0 ? a : a - b + 1) / b; }
-
 bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<CornerBlend, 8>& blends, const Texels& texels,
                    Apron apron, glm::ivec3 block, const TexelRows& out, FilledBrick& filled, const std::stop_token& stop) {
     const BricksDesc& desc = bricks->desc();
     const BrickId parent = *desc.coarser(brick);
     const glm::ivec3 ratio = desc.levels[std::size_t(parent.level)].stride / desc.levels[std::size_t(brick.level)].stride;
-    const glm::ivec3 blocks = desc.brick / block;
     const Index3 first = Index3(brick.index) * Index3(desc.brick);
     Mixing mixing{.side = desc.brick + apron.below + apron.above, .parent_dims = {}, .axes = {}, .blends = blends};
     Box box;  // of the parent's level
@@ -224,13 +243,14 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
                                                    float(in_brick) / float(desc.brick[a]), before});
         }
     }
-    const Decoded voxels(bricks, parent.level, {box.lo - Index3(kReach), box.hi + Index3(kReach)}, stop);
+    const Box around{box.lo - Index3(kAround), box.hi + Index3(kAround)};
+    const Decoded voxels(bricks, parent.level, around, stop);
     mixing.parent_dims = glm::ivec3(box.dims());
     const std::size_t count = box.voxels();
     Buffer values(count * texels.layout.bytes(), "brick"), gradients(out.gradients ? count * 8 : 0, "brick"), colours(out.colours ? count * 16 : 0, "brick");
     const TexelRows rows{values.data(), out.gradients ? gradients.as<std::int16_t>().data() : nullptr,
                          out.colours ? colours.as<glm::vec4>().data() : nullptr};
-    const bool invalid = write_texels(voxels, glm::ivec3(kReach), mixing.parent_dims, texels, rows);
+    const bool invalid = write_texels(voxels, glm::ivec3(kAround), mixing.parent_dims, texels, rows);
     const int channels = texels.layout.channels;
     if (texels.layout.wide)
         mixing.apply(reinterpret_cast<float*>(out.values), reinterpret_cast<const float*>(rows.values), channels);
@@ -239,24 +259,9 @@ bool mix_parent_in(const BricksPtr& bricks, BrickId brick, const std::array<Corn
     if (out.gradients) mixing.apply(out.gradients, rows.gradients, 4, glm::vec4(1.0f / glm::vec3(ratio), 1.0f));  // per step of the brick's level
     if (out.colours) mixing.apply(&out.colours->x, &rows.colours->x, 4);
 
-    const glm::ivec3 reach = reach_of(desc, brick.level);
-    // Each of the parent's voxels counts in the blocks that something is interpolated from it for.
-    const glm::ivec3 n = voxels.dims();
-    with_values(voxels, texels.layout.from, [&](const auto& range_of) {
-        for (int z = 0; z < n.z; ++z)
-            for (int y = 0; y < n.y; ++y)
-                for (int x = 0; x < n.x; ++x) {
-                    const Index3 at = (box.lo - Index3(kReach) + Index3(x, y, z)) * Index3(ratio) - first;  // in the brick
-                    glm::ivec3 lo, hi;
-                    for (int a = 0; a < 3; ++a) {
-                        lo[a] = std::max(0, int(floor_divided(at[a] - reach[a] - ratio[a], block[a])));
-                        hi[a] = std::min(blocks[a] - 1, int(floor_divided(at[a] + reach[a] + ratio[a], block[a])));
-                    }
-                    for (int bz = lo.z; bz <= hi.z; ++bz)
-                        for (int by = lo.y; by <= hi.y; ++by)
-                            for (int bx = lo.x; bx <= hi.x; ++bx) widen(filled.ranges[index_in(blocks, bx, by, bz)], range_of(index_in(n, x, y, z)));
-                }
-    });
+    const Windows windows = windows_of_blocks(first, block, desc.brick / block, reach_of(desc, brick.level), ratio, around);
+    const std::vector<glm::vec2> coarse = ranges_in(voxels, texels.layout.from, windows);
+    for (std::size_t i = 0; i < coarse.size(); ++i) widen(filled.ranges[i], coarse[i]);
     return invalid;
 }
 
@@ -272,10 +277,12 @@ FilledBrick fill_texels(const BricksPtr& bricks, BrickId brick, const std::array
                         Apron apron, glm::ivec3 block, const TexelRows& out, const std::stop_token& stop) {
     const glm::ivec3 size = bricks->desc().brick;
     const Index3 first = Index3(brick.index) * Index3(size);
-    const Decoded voxels(bricks, brick.level, {first - Index3(kReach), first + Index3(size) + Index3(kReach)}, stop);
+    const Box around{first - Index3(kAround), first + Index3(size) + Index3(kAround)};
+    const Decoded voxels(bricks, brick.level, around, stop);
     FilledBrick filled;
-    filled.found_invalid = write_texels(voxels, glm::ivec3(kReach - apron.below), size + apron.below + apron.above, texels, out);
-    filled.ranges = ranges_of_blocks(voxels, texels.layout.from, block, size / block, reach_of(bricks->desc(), brick.level));
+    filled.found_invalid = write_texels(voxels, glm::ivec3(kAround - apron.below), size + apron.below + apron.above, texels, out);
+    filled.ranges = ranges_in(voxels, texels.layout.from, windows_of_blocks(first, block, size / block, reach_of(bricks->desc(), brick.level),
+                                                                            glm::ivec3(1), around));
     if (blends != std::array<CornerBlend, 8>{} && mix_parent_in(bricks, brick, blends, texels, apron, block, out, filled, stop))
         filled.found_invalid = true;
     return filled;

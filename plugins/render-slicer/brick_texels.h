@@ -32,9 +32,9 @@ struct WantedBrick {
     bool blends() const { return blend != CornerBlend{}; }
 };
 
-// Voxels of level 0 around a block that a square of pixels may meet together with it, and so many around a brick are
-// decoded.
-inline constexpr int kReach = 3;
+// Voxels of level 0 around a block that a square of pixels may meet together with it. Around a brick one more is
+// decoded, as the last of them lie between two voxels.
+inline constexpr int kReach = 3, kAround = kReach + 1;
 
 // Where the texels of a brick and its apron go, x fastest; null where they are not kept.
 struct TexelRows {

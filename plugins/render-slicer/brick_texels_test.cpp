@@ -137,6 +137,31 @@ TEST(BrickTexels, WhatIsNotANumberHasNoWeightInTheMixture) {
     EXPECT_FALSE(fill(bricks, {0, {2, 2, 2}}, kAll, {0, 31}).brick.found_invalid);
 }
 
+TEST(BrickTexels, RangesAreOfTheVoxelsAroundABlockAndNoOthers) {
+    const VolumePtr volume = make_volume({40, 40, 40}, ScalarType::i16, [](auto x, auto y, auto z) { return noise(x, y, z) - 2000; });
+    const BricksPtr bricks = make_dense_pyramid(volume, glm::ivec3(8), PyramidFilter::subsample);
+    for (int level : {0, 1}) {
+        const glm::ivec3 brick(1, 2, 1), stride = bricks->desc().levels[std::size_t(level)].stride;
+        const Index3 last = bricks->desc().levels[std::size_t(level)].dims - Index3(1);
+        const int reach = level == 0 ? 3 : 2;  // of two voxels of level 0, rounded up, and one more
+        const Filled filled = fill(bricks, {level, brick}, {}, {-2000, 2093});
+        for (int b = 0; b < 8; ++b) {
+            const Index3 lo = Index3(brick * 8 + glm::ivec3(b & 1, b >> 1 & 1, b >> 2) * 4) - Index3(reach);
+            const Index3 hi = lo + Index3(4 + 2 * reach);
+            double least = 1e9, most = -1e9;
+            for (std::int64_t z = lo.z; z <= hi.z; ++z)
+                for (std::int64_t y = lo.y; y <= hi.y; ++y)
+                    for (std::int64_t x = lo.x; x <= hi.x; ++x) {
+                        const double v = voxel(*volume, glm::clamp(Index3(x, y, z), Index3(0), last) * Index3(stride));
+                        least = std::min(least, v);
+                        most = std::max(most, v);
+                    }
+            EXPECT_EQ(filled.brick.ranges[std::size_t(b)].x, float(least)) << level << " " << b;
+            EXPECT_EQ(filled.brick.ranges[std::size_t(b)].y, float(most)) << level << " " << b;
+        }
+    }
+}
+
 TEST(BrickTexels, RangesHoldTheMixture) {
     // An impulse of the parent's that the brick has not, as filters that overshoot give it: the ranges of the blocks
     // must hold both.

@@ -192,7 +192,7 @@ std::shared_ptr<Image> draw_bricks(const BricksPtr& bricks, const Selection& sel
         return image;
     }
     if (const std::vector<BrickId> missing = plan.missing(); !missing.empty() && ev.wants_provisional() && cut.first_picture > 0) {
-        Decoding decoding(bricks, missing, kReach, cut.bytes_per_second);
+        Decoding decoding(bricks, missing, kAround, cut.bytes_per_second);
         while (!decoding.wait(cut.first_picture, ev.stop())) {
             ev.provisional("image", ImagePtr(draw_scene(load_bricks(plan, request, ev, true), desc, *selection.plane, cut, ev)));
             ev.count("provisional pictures");

@@ -693,7 +693,7 @@ void show_while_decoding(const Scene& scene, const View& view, const VolumeDesc&
     const S& s = scene.settings;
     const std::vector<BrickId> missing = job.plan.missing();
     if (missing.empty()) return;
-    Decoding decoding(job.plan.bricks, missing, kReach, 0);
+    Decoding decoding(job.plan.bricks, missing, kAround, 0);
     double wait = s.first_picture;
     while (!decoding.wait(wait, ev.stop())) {
         const std::int64_t start = wall_ns();
