@@ -510,6 +510,35 @@ TEST_F(Window, theExampleOfCodecsIsDrawnAsItStandsInTheDocs) {
     keep(editor.screenshot(), "uncompressed");
 }
 
+TEST_F(Window, aNodeThatIsDroppedOnAWireGoesIntoIt) {
+    const std::string text = R"(voxloom: 1
+outputs: [view.image]
+nodes:
+  - { id: head, type: readers.phantom, set: { kind: ct-head, dims: [24, 24, 24], type: u8 }, at: [0, 0] }
+  - { id: tf, type: scene.transfer, in: { fit: head.volume }, at: [220, 200] }
+  - { id: camera, type: scene.camera, in: { fit: head.volume }, at: [220, 400] }
+  - { id: view, type: slicer.render, in: { source: head.volume, transfer: tf.transfer, camera: camera.camera }, set: { size: [48, 48] }, at: [700, 0] }
+  - { id: code, type: wavelet.encode, at: [420, 520] }
+)";
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    const json items = editor.with("node:code")["items"];
+    auto middle = [&](const char* a, const char* b, int k) { return int((items[a][k].get<double>() + items[a][k + 2].get<double>() + items[b][k].get<double>() + items[b][k + 2].get<double>()) / 4); };
+    editor.move_to("node:code");
+    editor.press();
+    editor.move_by(3, 3);
+    editor.move_by(middle("out:head.volume", "in:view.source", 0) - middle("node:code", "node:code", 0) - 3,
+                   middle("out:head.volume", "in:view.source", 1) - middle("node:code", "node:code", 1) - 3);
+    editor.release();
+    json s = editor.wait_for("the codec in the wire", [](const json& now) { return now["text"].get<std::string>().find("source: code.bricks") != std::string::npos && shows_final(now, "view.image"); });
+    EXPECT_THAT(s["text"].get<std::string>(), HasSubstr("in: { volume: head.volume }"));
+    EXPECT_EQ(s["problems"], 0);
+    editor.key("z", "ctrl");
+    editor.wait_for("undo of both at once", [&](const json& now) { return now["text"] == text; });
+}
+
 // Only what changes is drawn; what comes of many changes is what is drawn at once.
 TEST_F(Window, whatIsDrawnInPartsIsWhatIsDrawnAsAWhole) {
     VirtualDisplay display(1280, 720);

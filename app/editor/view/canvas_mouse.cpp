@@ -124,21 +124,22 @@ void drop_wire(Editor& editor, const Hit& hit, glm::dvec2 mouse) {
     });
 }
 
-void drop_nodes(Editor& editor, const std::vector<Wire>& wires) {
+void drop_nodes(Editor& editor, const std::vector<Wire>& wires, glm::dvec2 mouse) {
     Canvas& canvas = editor.canvas;
     if (canvas.moved == glm::dvec2(0.0)) return;
     Document::Step step(editor.work.document);
     edit(editor, [&] {
         move_selected(editor.work, canvas.boxes, canvas.moved);
         if (!editor.work.single()) return;
-        // A node without wires that is dropped on one goes into it.
+        // A node without wires that is dropped on one goes into it: the hand that holds it is there, or its middle.
         const std::string id = editor.work.single()->id;
         const auto& nodes = editor.work.graph().nodes;
         const auto i = std::size_t(editor.work.single() - nodes.data());
         const glm::dvec2 middle = canvas.to_screen(*nodes[i].at + canvas.boxes[i].size * 0.5);
         for (const Wire& wire : wires) {
             if (wire.from.node == id || wire.to.node == id) return;
-            if (distance_to(wire, middle) > 24 * double(theme().scale) * canvas.zoom) continue;
+            const double scale = double(theme().scale);
+            if (distance_to(wire, mouse) > 16 * scale && distance_to(wire, middle) > 24 * scale * canvas.zoom) continue;
             if (insert_on_wire(editor.work, editor.registry, id, wire.from, wire.to)) return;
         }
     });
@@ -274,7 +275,7 @@ void handle_mouse(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) return;
     const Canvas::Drag ended = std::exchange(canvas.drag, Canvas::Drag::none);
     if (ended == Canvas::Drag::wire) drop_wire(editor, hit, mouse);
-    if (ended == Canvas::Drag::nodes) drop_nodes(editor, wires);
+    if (ended == Canvas::Drag::nodes) drop_nodes(editor, wires, mouse);
     if (ended == Canvas::Drag::box) select_in_box(editor, canvas.grabbed, at);
     canvas.moved = glm::dvec2(0.0);
 }

@@ -319,6 +319,7 @@ void draw_help(Editor& editor) {
         {"Drag the picture", "Turns its camera; with Shift or the middle button, moves it."},
         {"Wheel on the picture", "Zooms the camera; with Ctrl, magnifies the picture."},
         {"Pictures' list, upper right", "Compares: two, four, wiped, in turns, their difference."},
+        {"A name above the numbers", "Makes its picture the one that errors are measured against."},
         {"Drop a node on a wire", "Puts it into the wire."},
         {"Drag a group's title", "Moves its nodes and the comments in it; double click changes it."},
         {"Alt+click a wire", "Removes it."},
