@@ -6,7 +6,7 @@
 
 namespace voxloom {
 
-// Bits of x, y and z in turns, x lowest; none of them is negative or above 2^21.
+// Bits of x, y and z in turns, x lowest; all of them from 0 to 2^21 - 1.
 inline std::uint64_t morton(glm::ivec3 p) {
     std::uint64_t code = 0;
     for (int bit = 0; bit < 21; ++bit)

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/error.h"
 #include "plugins/codec-wavelet/adaptive_number.h"
 #include "plugins/codec-wavelet/wavelet_bricks.h"
 
@@ -186,7 +187,7 @@ BrickInfo CodedStatistics::info(int level, std::size_t brick) const {
     const BrickCodes& c = levels[std::size_t(level)][brick];
     BrickInfo info;
     info.range.min = scale.value(c.number[0]);
-    info.range.max = scale.value(std::int64_t(c.number[0]) + c.number[1]);
+    info.range.max = scale.value(std::min(c.number[0] + c.number[1], 65535));
     info.l2 = from_error_code(c.number[2], error_steps);
     info.max_error = from_error_code(std::uint16_t(c.number[3] + c.number[2]), error_steps);
     if (level == 0) info.octant_l2[0] = info.l2;
@@ -225,6 +226,8 @@ CodedStatistics read_statistics(const BricksDesc& desc, ByteReader& reader, std:
     CodedStatistics out;
     out.scale.lo = reader.number<double>();
     out.scale.step = reader.number<double>();
+    if (!std::isfinite(out.scale.lo) || !(out.scale.step >= 0) || !std::isfinite(out.scale.value(65535)))
+        fail("its ranges are not finite");
     out.error_steps = before_4 ? kErrorStepsBefore4 : kErrorSteps;
     out.share_steps = before_4 ? kShareStepsBefore4 : kShareSteps;
     for (const LevelDesc& level : desc.levels) out.levels.emplace_back(Box::of(Index3(level.bricks)).voxels());

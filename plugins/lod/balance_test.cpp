@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "plugins/lod/balance.h"
 #include "plugins/lod/nodes.h"
+#include "plugins/lod/priority.h"
 #include "plugins/lod/synthetic_bricks.h"
 #include "tests/support/run_node.h"
 
@@ -139,6 +141,29 @@ TEST(Balance, MergingKeepsTheBudgetAndTheBalance) {
         expect_balanced(tree, bricks.desc());
         expect_blends(tree, bricks.desc());
     }
+}
+
+TEST(Balance, WhatIsMixedInCountsAsAnError) {
+    // Level 1 is off by 0.03 everywhere, level 2 by 0.04: bricks of level 1 that blend may be off by 0.05.
+    const auto bricks = std::make_shared<SyntheticBricks>(Index3(64), glm::ivec3(8), [](int level, glm::dvec3) { return 0.02 + 0.01 * level; });
+    auto selection = new_selection(bricks->desc(), "test", nullptr, {});
+    for (const BrickId& id : bricks->desc().finer({3, {0, 0, 0}})) {
+        if (bricks->desc().octant_of(id) != 3) selection->bricks.push_back({.id = id});
+        else
+            for (const BrickId& finer : bricks->desc().finer(id)) selection->bricks.push_back({.id = finer});
+    }
+    CompleteTree tree(bricks->desc(), *selection);
+    const ErrorModel errors = value_errors(bricks);
+    predict_errors(tree.cut(), bricks->desc(), errors, nullptr);
+    tree.set_corner_blends();
+    add_blend_errors(tree.cut(), bricks->desc(), errors, nullptr);
+    std::size_t blending = 0;
+    for (const Cut::Node* node : leaves_of(tree)) {
+        const bool blends = std::ranges::any_of(node->corner_blend, [](float share) { return share > 0; });
+        EXPECT_NEAR(node->predicted_error, node->id.level == 2 ? 0.04 : blends ? 0.05 : 0.03, 1e-6);
+        blending += blends;
+    }
+    EXPECT_EQ(blending, 7u);  // all but the one in the volume's corner
 }
 
 TEST(BalanceNode, CountsWhatItAddsAgainstTheBudget) {

@@ -1,7 +1,6 @@
 #include "plugins/lod/priority.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <queue>
@@ -213,33 +212,17 @@ void predict_errors(Cut& cut, const BricksDesc& bricks, const ErrorModel& errors
     }
 }
 
-namespace {
-
-// Mean square over a brick of what is trilinear between its corners.
-double mean_square(const std::array<float, 8>& corner) {
-    double sum = 0;
-    for (unsigned i = 0; i < 8; ++i)
-        for (unsigned j = 0; j < 8; ++j)  // each axis: 1/3 where they are on one side, else 1/6
-            sum += double(corner[i]) * double(corner[j]) / (27.0 * (1 << std::popcount(i ^ j)));
-    return sum;
-}
-
-}  // namespace
-
 void add_blend_errors(Cut& cut, const BricksDesc& bricks, const ErrorModel& errors, const Sight* sight) {
     for (Cut::Node& node : cut.nodes) {
-        std::array<float, 8> own;
-        for (std::size_t c = 0; c < 8; ++c) own[c] = 1 - node.corner_blend[c];
         const std::optional<BrickId> parent = bricks.coarser(node.id);
-        const double share = mean_square(node.corner_blend);
-        if (!node.draws() || !parent || share == 0) continue;
+        if (!node.draws() || !parent || std::ranges::count(node.corner_blend, 0.0f) == 8) continue;
         const std::optional<OctantErrors> squares = errors(*parent);
         if (!squares) continue;
         const int octant = bricks.octant_of(node.id);
         const Box box = fine_box_of_octant(bricks, *parent, octant);
         const double pixels = sight ? sight->pixels(parent->level, sight->depth(region_of(bricks.volume, box))) : 1.0;
-        node.predicted_error = node.predicted_error * std::sqrt(mean_square(own)) +
-                               pixel_error((*squares)[std::size_t(octant)] * share, double(box.voxels()), pixels);
+        node.predicted_error = std::hypot(node.predicted_error,
+                                          pixel_error((*squares)[std::size_t(octant)], double(box.voxels()), pixels));
     }
 }
 

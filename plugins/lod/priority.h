@@ -40,7 +40,8 @@ double pixel_error(double squared, double voxels, double pixels_per_voxel);
 // For selections made by other rules: the pixel error of every brick of a cut, and which of them cannot
 // be seen (drawn becomes false).
 void predict_errors(Cut& cut, const BricksDesc& bricks, const ErrorModel& errors, const Sight* sight);
-// Where bricks blend, what their parents add to that: error times share, in the root of the mean square.
+// Where bricks blend, what their parents' errors there add to that: ((1-s) a + s b)^2 is at most a^2 + b^2, whatever the
+// shares s; of bounds the larger one holds.
 void add_blend_errors(Cut& cut, const BricksDesc& bricks, const ErrorModel& errors, const Sight* sight);
 
 }  // namespace voxloom::lod

@@ -104,7 +104,8 @@ glm::ivec3 Atlas::texel_of(BrickId id) const {
 
 // Where a level lies in the texture as a whole, bricks that nobody asks for are there too, as one of the
 // values that they can have: a ray that strays into one from a neighbour then meets nothing that is not in
-// the brick, so a brick that cannot be seen is not seen.
+// the brick, so a brick that cannot be seen is not seen. Where a neighbour blends that does not hold for the
+// voxels that they share: may_show_mixture().
 void Atlas::begin_level(const Bricks& bricks, int level) {
     if (!places_.whole() || begun_[std::size_t(level)]) return;
     begun_[std::size_t(level)] = true;
@@ -135,9 +136,10 @@ bool Atlas::has(const WantedBrick& brick) const {
     return it != index_.end() && !it->second->spoilt && it->second->wanted.blend == brick.blend;
 }
 
-bool Atlas::blends(BrickId id) const {
-    const auto it = index_.find(id);
-    return it != index_.end() && it->second->wanted.blends();
+bool Atlas::may_show_mixture(BrickId id) const {
+    bool may = false;
+    for_each_around(id, [&](const Brick& brick) { may = may || brick.wanted.blends(); });
+    return may;
 }
 
 glm::vec2 Atlas::range_of(BrickId id, glm::ivec3 lo, glm::ivec3 hi) const {
@@ -187,11 +189,10 @@ bool Atlas::find_slot(std::int64_t& slot) {
 
 // Side by side, bricks share voxels: each writes its apron too, with the mixture of those that are wanted beside
 // it. So neighbours that are drawn together agree; one that nobody wants just now is spoilt.
-void Atlas::spoil_neighbours(BrickId id) {
-    for (int o = 0; o < 27; ++o) {
-        const auto it = index_.find({id.level, id.index + glm::ivec3(o % 3, o / 3 % 3, o / 9) - 1});
-        if (it != index_.end() && it->second->picture != picture_) it->second->spoilt = true;
-    }
+void Atlas::spoil_neighbours(const WantedBrick& loaded) {
+    for_each_around(loaded.id, [&](Brick& brick) {
+        if (brick.picture != picture_ && (loaded.blends() || brick.wanted.blends())) brick.spoilt = true;
+    });
 }
 
 Atlas::Counters Atlas::load(const BricksPtr& bricks, const std::vector<WantedBrick>& wanted, const std::stop_token& stop,
@@ -251,6 +252,7 @@ Atlas::Counters Atlas::load(const BricksPtr& bricks, const std::vector<WantedBri
             gpu::upload(*values_, corner, side_, l.format(), l.type(), from.values);
             if (gradients_) gpu::upload(*gradients_, corner, side_, GL_RGBA, GL_SHORT, from.gradients);
             if (colours_) gpu::upload(*colours_, corner, side_, GL_RGBA, GL_FLOAT, from.colours);
+            if (texels_.mixed && places_.whole()) spoil_neighbours(brick.wanted);
             order_.push_front(std::move(brick));
             index_[order_.front().wanted.id] = order_.begin();
         }
@@ -258,8 +260,6 @@ Atlas::Counters Atlas::load(const BricksPtr& bricks, const std::vector<WantedBri
         counters.bytes += count * voxels * texels_.bytes();
         progress(double(first + count) / double(missing.size()));
     }
-    if (texels_.mixed && places_.whole())
-        for (const WantedBrick& brick : missing) spoil_neighbours(brick.id);
     gpu::check_errors("uploading bricks");
     return counters;
 }

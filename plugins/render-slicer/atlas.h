@@ -54,7 +54,10 @@ class Atlas {
                   const std::function<void(double)>& progress);
 
     bool has(const WantedBrick& brick) const;  // with this mixture
-    bool blends(BrickId id) const;             // is resident with its parent mixed in, so it shows values not its own
+    bool is_resident(BrickId id) const { return index_.contains(id); }  // with whatever mixture
+    // Whether a brick or one that it shares voxels with is resident with its parent mixed in, so that values may be
+    // met in it that are not its own.
+    bool may_show_mixture(BrickId id) const;
     std::int64_t slots() const { return places_.slots; }
     const Places& places() const { return places_; }
     const gpu::TexturePtr& values() const { return values_; }
@@ -86,7 +89,15 @@ class Atlas {
     void begin_level(const Bricks& bricks, int level);
     bool keep(const WantedBrick& brick);
     bool find_slot(std::int64_t& slot);
-    void spoil_neighbours(BrickId id);
+    void spoil_neighbours(const WantedBrick& loaded);
+    // Calls f(brick) for the resident ones of a brick and the 26 about it.
+    template <class F>
+    void for_each_around(BrickId id, const F& f) const {
+        for (int o = 0; o < 27; ++o) {
+            const auto it = index_.find({id.level, id.index + glm::ivec3(o % 3, o / 3 % 3, o / 9) - 1});
+            if (it != index_.end()) f(*it->second);
+        }
+    }
 
     Texels texels_;
     Apron apron_;

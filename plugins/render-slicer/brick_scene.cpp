@@ -137,7 +137,7 @@ std::vector<Page> pages_of_what_is_there(const BrickPlan& plan) {
     };
     auto is_mixed = [&](const WantedBrick& brick) {
         return plan.atlas->has(brick) || (is_decoded(*plan.bricks, brick.id, kAround) &&
-                                          is_decoded(*plan.bricks, *plan.bricks->desc().coarser(brick.id), kAround));
+                                          is_decoded(*plan.bricks, *plan.bricks->desc().coarser(brick.id), kAround + 2));
     };
     std::vector<Page> pages = plan.pages;
     for (Page& p : pages) {
@@ -328,9 +328,23 @@ BrickScene load_bricks(BrickPlan& plan, const BrickRequest& request, Evaluation&
 
     PageGrid grid = what_is_there ? grid_of(desc, pages) : plan.grid;
     if (request.in_view && atlas->places().whole()) {
-        PageGrid joined = merged(desc, grid, [&](BrickId id) {
+        auto is_seen = [&](BrickId id) {
             const ValueRange r = bricks->info(id).range;
-            return !atlas->blends(id) && (!request.visible(scene.range.min, r.min, r.max) || !request.in_view(desc.fine_box_of(id)));
+            return request.visible(scene.range.min, r.min, r.max);
+        };
+        // Its last cells end at voxels of the bricks behind it, which something stands in for where they are drawn at
+        // another level.
+        auto ends_unseen = [&](BrickId id) {
+            bool all = true;
+            for (int o = 1; o < 8; ++o) {
+                const BrickId behind{id.level, id.index + glm::ivec3(o & 1, o >> 1 & 1, o >> 2)};
+                all = all && (!desc.has(behind) || atlas->is_resident(behind) || !is_seen(behind));
+            }
+            return all;
+        };
+        PageGrid joined = merged(desc, grid, [&](BrickId id) {
+            if (!request.in_view(desc.fine_box_of(id))) return true;
+            return !is_seen(id) && ends_unseen(id) && !atlas->may_show_mixture(id);
         });
         // Boxes of small cells may be more than the large bricks that they are of.
         if (joined.pages.size() <= grid.pages.size()) grid = std::move(joined);

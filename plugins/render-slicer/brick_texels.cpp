@@ -133,15 +133,26 @@ using Windows = std::array<std::vector<Window>, 3>;
 // What lies in the windows of each block: along x, then of what that gives along y, then along z.
 std::vector<glm::vec2> ranges_in(const Decoded& voxels, int from, const Windows& windows) {
     glm::ivec3 n = voxels.dims();
-    std::vector<glm::vec2> ranges(voxels_in(n));
+    const glm::ivec3 first_n(int(windows[0].size()), n.y, n.z);
+    std::vector<glm::vec2> ranges(voxels_in(first_n), kNothing);
     with_values(voxels, from, [&](const auto& range_of) {
-        for (std::size_t i = 0; i < ranges.size(); ++i) ranges[i] = range_of(i);
+        std::vector<glm::vec2> row(std::size_t(n.x));
+        for (int z = 0; z < n.z; ++z)
+            for (int y = 0; y < n.y; ++y) {
+                for (int x = 0; x < n.x; ++x) row[std::size_t(x)] = range_of(index_in(n, x, y, z));
+                for (int b = 0; b < first_n.x; ++b) {
+                    const Window& window = windows[0][std::size_t(b)];
+                    glm::vec2& out = ranges[index_in(first_n, b, y, z)];
+                    for (int x = window.first; x < window.first + window.count; ++x) widen(out, row[std::size_t(x)]);
+                }
+            }
     });
-    for (int axis = 0; axis < 3; ++axis) {
+    n = first_n;
+    for (int axis = 1; axis < 3; ++axis) {
         const std::vector<Window>& along = windows[std::size_t(axis)];
         glm::ivec3 fewer = n;
         fewer[axis] = int(along.size());
-        const std::size_t stride = index_in(n, axis == 0, axis == 1, axis == 2);
+        const std::size_t stride = index_in(n, 0, axis == 1, axis == 2);
         std::vector<glm::vec2> joined(voxels_in(fewer), kNothing);
         for (int z = 0; z < fewer.z; ++z)
             for (int y = 0; y < fewer.y; ++y)

@@ -317,6 +317,32 @@ TEST(BrickPath, WhatIsMissingAndCannotBeSeenIsStillNotSeen) {
         }
 }
 
+TEST(BrickPath, WhatStandsInForABrickOfAnotherLevelIsNotSeen) {
+    // Blocks in four octants, away from all faces; one of them is drawn finer. What stands in for it at the coarse
+    // level is in the middle of its values, which is seen; the empty octant before it must not show that.
+    const VolumePtr volume = make_volume({64, 64, 64}, ScalarType::u8, [](auto x, auto y, auto z) {
+        const std::int64_t p[] = {x, y, z};
+        int octant = 0;
+        bool inside = true;
+        for (int a = 0; a < 3; ++a) {
+            octant |= (p[a] >= 32) << a;
+            inside = inside && (p[a] % 32 > 4) && (p[a] % 32 < 27);
+        }
+        return inside && (octant == 1 || octant == 2 || octant == 4 || octant == 7) ? 200.0 : 0.0;
+    });
+    const BricksPtr bricks = pyramid(volume, 16, PyramidFilter::subsample);
+    const TransferPtr tf = transfer({{{40, Emission(0)}, {60, Emission(0.2)}, {140, Emission(0.2)}, {160, Emission(0)}}});
+    Camera camera = looking({0, 0, 1}, volume->desc(), kOrthographic);
+    camera.up = {0, 1, 0};
+    for (bool blended : {false, true})
+        for (const char* mode : {"", ", skipping: false", ", compositing: x-ray, skipping: false"}) {
+            const ImagePtr image = draw(bricks, two_levels(bricks->desc(), 7, blended), tf, camera, mode).image();
+            EXPECT_GT(brightest(*image), 0.1);
+            // Rays about the middle go along faces, past all blocks.
+            for (int p = 0; p < 4; ++p) EXPECT_EQ(image->at(23 + p % 2, 19 + p / 2).a, 0) << blended << mode << p;
+        }
+}
+
 TEST(BrickPath, SkippingChangesNothing) {
     const VolumePtr volume = make_volume({60, 50, 70}, ScalarType::u8, [](auto x, auto y, auto z) {
         return glm::distance(glm::dvec3(x, y, z), glm::dvec3(30, 20, 40)) < 12 || (x == 7 && y == 9) ? 200.0 : double((x * y + z) % 20);

@@ -14,6 +14,7 @@ std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, con
     auto add = [&](const SelectedBrick& b) {
         const bool blends = std::ranges::any_of(b.corner_blend, [](float r) { return r > 0; });
         const std::optional<BrickId> parent = blends ? desc.coarser(b.id) : std::nullopt;
+        const CornerBlend blend = parent ? b.corner_blend : CornerBlend{};
         ValueRange range = bricks.info(b.id).range;
         if (parent) {
             const ValueRange coarse = bricks.info(*parent).range;
@@ -24,13 +25,13 @@ std::vector<Page> pages_of(const Bricks& bricks, const Selection* selection, con
             return;
         }
         if (b.octants == 0xff || b.id.level == 0) {
-            pages.push_back({b.id, desc.fine_box_of(b.id), b.id.level, b.corner_blend, parent});
+            pages.push_back({b.id, desc.fine_box_of(b.id), b.id.level, blend, parent});
             return;
         }
         for (int o = 0; o < 8; ++o)
             if (b.octants >> o & 1)
                 if (const Box cell = fine_box_of_octant(desc, b.id, o); !cell.empty())
-                    pages.push_back({b.id, cell, b.id.level - 1, b.corner_blend, parent});
+                    pages.push_back({b.id, cell, b.id.level - 1, blend, parent});
     };
     if (selection) {
         for (const SelectedBrick& b : selection->bricks) add(b);

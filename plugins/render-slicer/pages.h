@@ -16,7 +16,7 @@ struct Page {
     BrickId brick;                // that is drawn; of merged pages the first one, and its level counts
     Box cell;                     // voxels of level 0
     int cell_level = 0;           // it is as large as a brick of this one
-    std::array<float, 8> blend{};
+    CornerBlend blend{};
     std::optional<BrickId> parent = std::nullopt;  // where it blends and the shader is to mix; else its texels are mixed
     bool merged = false;          // of bricks that lie side by side in the texture too
 };
