@@ -168,14 +168,15 @@ void Document::apply(const Graph& wanted) {
     for (bool surgical : {true, false}) {
         auto edit = std::make_shared<GraphEdit>();
         std::size_t at = 0;
+        bool all = true;
         for (TextPatch& patch : patches_between(text_, *tree_, graph_, wanted, surgical)) {
-            if (patch.position < at) break;  // overlapping patches; the comparison below notices
+            if (all = patch.position >= at; !all) break;  // overlapping patches; the comparison below notices
             at = patch.position + patch.length;
             edit->splices.push_back({patch.position, text_.substr(patch.position, patch.length),
                                      std::move(patch.inserted)});
         }
         std::string text = spliced(text_, edit->splices);
-        if (surgical && text.size() <= kMaximumGraphBytes)
+        if (surgical && all && text.size() <= kMaximumGraphBytes)
             if (auto items = items_of_edit(text_, *tree_, graph_, wanted, edit->splices)) {
                 edit->items = std::move(*items);
                 go(*edit, false);

@@ -159,7 +159,21 @@ class Edited {
             ++k;
         }
         if (k != to_.nodes.size() || (!gone.empty() && gone.front() == 0)) return false;
-        return taken + removals_beside(gone) == splices_.size();
+        return stand_alone_before(gone) && are_taken_whole(gone) && taken + removals_beside(gone) == splices_.size();
+    }
+
+    // What stands before a node that goes stays what it is, whatever follows it.
+    bool stand_alone_before(const std::vector<std::size_t>& gone) const {
+        return std::ranges::all_of(gone, [&](std::size_t i) {
+            return can_be_alone(std::string_view(text_).substr(item(i - 1).begin, item(i).begin - item(i - 1).begin));
+        });
+    }
+    bool are_taken_whole(const std::vector<std::size_t>& gone) const {
+        return std::ranges::all_of(gone, [&](std::size_t i) {
+            return std::ranges::any_of(splices_, [&](const Splice& s) {
+                return s.inserted.empty() && s.position <= item(i).begin && item(i).end <= s.position + s.removed.size();
+            });
+        });
     }
 
     std::size_t region_end(std::size_t i) const { return next_line(text_, item(i).end); }

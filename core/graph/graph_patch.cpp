@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 #include "core/base/text.h"
 #include "core/graph/graph_text.h"
@@ -397,7 +398,15 @@ class Patcher {
                 else
                     remove_flow_tail(spans[i - 1].end, spans[i].begin, spans[next - 1].end);
             } else {
-                for (std::size_t k = i; k < next; ++k) remove_lines(spans[k]);
+                // What stands on lines behind each other goes at once: the last may take a line break that is the other's.
+                Span lines = spans[i];
+                for (std::size_t k = i + 1; k < next; ++k) {
+                    if (line_start(spans[k].begin) > next_line(lines.end))
+                        remove_lines(std::exchange(lines, spans[k]));
+                    else
+                        lines.end = spans[k].end;
+                }
+                remove_lines(lines);
             }
             i = next;
         }
@@ -419,8 +428,10 @@ class Patcher {
 
     void remove_lines(Span span) {
         std::size_t begin = line_start(span.begin), end = next_line(span.end);
-        // The text's last line takes the line break before it along, so that none is added.
-        if (end == text_.size() && text_.back() != '\n') begin = end_of_line_before(begin);
+        // The text's last line takes the line break before it along, so that none is added. Where that changes a
+        // block text, it stays, and so that none gets more empty lines, those behind go.
+        if (surgical_ && end == text_.size() && text_.back() != '\n') begin = end_of_line_before(begin);
+        while (!surgical_ && is_empty_line(end)) end = next_line(end);
         patch(begin, end - begin, "");
     }
 
@@ -467,6 +478,10 @@ class Patcher {
     std::size_t next_line(std::size_t at) const {
         std::size_t newline = text_.find('\n', at);
         return newline == std::string::npos ? text_.size() : newline + 1;
+    }
+    bool is_empty_line(std::size_t start) const {
+        const std::size_t word = text_.find_first_not_of(" \r", start);
+        return word != std::string::npos && text_[word] == '\n';
     }
     std::size_t column(std::size_t at) const { return at - line_start(at); }
     bool begins_line(std::size_t at) const {

@@ -664,6 +664,57 @@ TEST(DocumentEdit, KeepsMarksWhereThingsStandWhateverIsReadAgain) {
     }
 }
 
+void expect_as_read_anew(const Document& document) {
+    const Document anew = Document::parse(document.text());
+    EXPECT_TRUE(same_content(document.graph(), anew.graph())) << document.text();
+    EXPECT_EQ(marks_of(document.graph()), marks_of(anew.graph())) << document.text();
+}
+
+TEST(DocumentEdit, RemovesTheLastNodesHoweverTheTextEnds) {
+    for (const std::string newline : {"\n", "\r\n"})
+        for (const std::string& end : {std::string(), newline, std::string("  # the end")}) {
+            auto lines = [&](std::initializer_list<const char*> all) {
+                std::string text;
+                for (const char* line : all) text += (text.empty() ? "" : newline) + line;
+                return text + end;
+            };
+            const std::string text = lines({"voxloom: 1", "nodes:", "  - id: a", "    type: t", "  - id: b", "    type: t", "  - id: c", "    type: t",
+                                            "  - { id: d, type: t, in: { x: c.out } }"});
+            Document document = Document::parse(text);
+            document.remove_nodes({"c", "d"});
+            const std::string rest = lines({"voxloom: 1", "nodes:", "  - id: a", "    type: t", "  - id: b", "    type: t"});
+            EXPECT_EQ(document.text(), end == newline ? rest : rest.substr(0, rest.size() - end.size()));
+            ASSERT_EQ(document.graph().nodes.size(), 2u);
+            expect_as_read_anew(document);
+            document.undo();
+            EXPECT_EQ(document.text(), text);
+            expect_as_read_anew(document);
+            document.remove_nodes({"b", "d"});
+            expect_as_read_anew(document);
+            document.remove_node("c");
+            ASSERT_EQ(document.graph().nodes.size(), 1u);
+            expect_as_read_anew(document);
+        }
+}
+
+TEST(DocumentEdit, LeavesABlockTextAsItIsWhereTheNodeBehindGoes) {
+    const std::string before = "voxloom: 1\nnodes:\n  - id: a\n    type: t\n    set:\n      text: ";
+    for (const std::string block : {"|\n        x\n", ">\n        x\n", "|+\n        x\n\n", "|+\n        x\n\n\n"})
+        for (const std::string behind : {"", "\n", "\n\n", "\n\n  - id: c\n    type: t", "\n  - id: c\n    type: t\n"}) {
+            const std::string text = before + block + "  - id: b\n    type: t" + behind;
+            Document document = Document::parse(text);
+            auto value = [&] { return document.graph().find("a")->params.at(0).yaml.text; };
+            const std::string was = value();
+            document.remove_node("b");
+            EXPECT_EQ(document.graph().find("b"), nullptr);
+            EXPECT_EQ(value(), was) << text;
+            expect_as_read_anew(document);
+            document.undo();
+            EXPECT_EQ(document.text(), text);
+            expect_as_read_anew(document);
+        }
+}
+
 // Documents share what they read until one of them changes it.
 TEST(DocumentEdit, LeavesCopiesAsTheyAre) {
     Document document = Document::parse(kGraph);
