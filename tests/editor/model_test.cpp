@@ -537,6 +537,14 @@ TEST(Background, makesWhatIsAskedForOnceAndKeepsIt) {
     EXPECT_EQ(background.find({b, a, 1}, failing), nullptr);
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     EXPECT_EQ(tries, 1);
+    // Nor does one that was cancelled on the way keep others from being made.
+    auto cancelled = [&](const std::stop_token&) -> std::shared_ptr<const int> {
+        ++tries;
+        throw Cancelled();
+    };
+    EXPECT_EQ(background.find({a, b, 2}, cancelled), nullptr);
+    for (int i = 0; i < 5000 && tries == 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_EQ(made(a, 7), 17);
 }
 
 // --- the camera ----------------------------------------------------------------------------------

@@ -11,7 +11,6 @@
 #include <thread>
 #include <utility>
 
-#include "core/base/error.h"
 #include "core/base/priority.h"
 
 namespace voxloom::editor {
@@ -86,9 +85,8 @@ class Background {
             Result result;
             try {
                 result = make(stop);
-            } catch (const Cancelled&) {
-                return;
             } catch (const std::exception&) {
+                if (stop.stop_requested()) return;
                 result = nullptr;
             }
             make = nullptr;  // gives back what it is made of
