@@ -90,10 +90,15 @@ TEST_F(Live, theLastOfManyChangesWins) {
 }
 
 TEST_F(Live, problemsLandOnTheirNodes) {
+    submit();
+    finish();
+    EXPECT_EQ(state.volumes.count("add.volume"), 1u);
     document.set_param("add", "amount", std::string("much"));
     document.add_node("odd", "not.here");
     submit();
     finish();
+    EXPECT_EQ(state.volumes.count("add.volume"), 0u) << "what does not run gives nothing";
+    EXPECT_EQ(state.volumes.count("source.volume"), 1u);
     EXPECT_EQ(state.nodes.at("add").state, NodeState::failed);
     EXPECT_FALSE(state.nodes.at("add").message.empty());
     EXPECT_EQ(state.nodes.at("table").state, NodeState::not_run);

@@ -196,9 +196,11 @@ void Evaluator::publish(const Plan& plan, const Request& request) {
         status.state = node.off.empty() ? NodeState::not_run : NodeState::not_asked;
         status.message = node.off.empty() ? "something that it needs has a problem" : node.off;
     }
-    std::erase_if(state_.values, [&](const auto& entry) {
-        return plan.find(std::string_view(entry.first).substr(0, entry.first.find('.'))) < 0;
-    });
+    auto node_of = [&](const auto& entry) { return plan.find(std::string_view(entry.first).substr(0, entry.first.find('.'))); };
+    auto gives_nothing = [&](const auto& entry) { return node_of(entry) < 0 || !plan.nodes[std::size_t(node_of(entry))].ok; };
+    std::erase_if(state_.values, [&](const auto& entry) { return node_of(entry) < 0; });
+    std::erase_if(state_.volumes, gives_nothing);
+    std::erase_if(state_.bricks, gives_nothing);
     state_.graph = std::make_shared<const Graph>(request.graph);
     state_.problems.clear();
     if (!plan.nodes.empty()) state_.problems = plan.problems;  // an empty graph is a beginning
@@ -232,15 +234,19 @@ void Evaluator::collect(const Plan::Node& node, const Hash& key, const ResultCac
         auto took = wall_seconds_.find(key);
         status.wall_seconds = took == wall_seconds_.end() ? 0 : took->second;
     }
+    // A run that was superseded may still end; what it brings must not replace what is newer.
+    auto keep = [&](auto& kept, const auto& value) {
+        if (fresh || kept.expired()) kept = value;
+    };
     for (std::size_t o = 0; o < result.outputs.size(); ++o) {
         const std::string port = node.id + "." + node.type->outputs[o].key;
-        if (auto* volume = std::get_if<VolumePtr>(&result.outputs[o])) state_.volumes[port] = *volume;
-        if (auto* bricks = std::get_if<BricksPtr>(&result.outputs[o])) state_.bricks[port] = *bricks;
+        if (auto* volume = std::get_if<VolumePtr>(&result.outputs[o])) keep(state_.volumes[port], *volume);
+        if (auto* bricks = std::get_if<BricksPtr>(&result.outputs[o])) keep(state_.bricks[port], *bricks);
         if (is_shown(voxloom::type_of(result.outputs[o]))) show(port, result.outputs[o], fresh);
     }
 }
 
-// A run that was superseded may still end; what it brings must not replace what is newer.
+// Nor must it here.
 void Evaluator::show(const std::string& port, const Value& value, bool fresh) {
     LiveValue& shown = state_.values[port];
     if (shown.fresh && !fresh) return;
