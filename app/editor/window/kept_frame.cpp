@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <string_view>
 
 namespace voxloom::editor {
@@ -27,6 +28,13 @@ std::vector<DrawnList> lists_of(const ImDrawData& data) {
             to.commands.push_back({{c.ClipRect.x, c.ClipRect.y, c.ClipRect.z, c.ClipRect.w}, std::bit_cast<std::uintptr_t>(c.TextureId), c.VtxOffset, c.IdxOffset, c.ElemCount});
     }
     return lists;
+}
+
+// A part of a frame is cut at whole pixels, and so must be what is in it: cut between them, it would not fill its parts.
+void snap_clips(ImDrawData& data) {
+    for (int i = 0; i < data.CmdListsCount; ++i)
+        for (ImDrawCmd& c : data.CmdLists[i]->CmdBuffer)
+            c.ClipRect = {std::floor(c.ClipRect.x), std::floor(c.ClipRect.y), std::ceil(c.ClipRect.z), std::ceil(c.ClipRect.w)};
 }
 
 // Everything is drawn in this rectangle alone.
@@ -67,6 +75,7 @@ bool KeptFrame::draw(ImDrawData& data, glm::ivec2 size, ImVec4 background) {
     if (size.x < 1 || size.y < 1) return false;
     if (size != size_) forget();
     size_ = size;
+    snap_clips(data);
     std::vector<DrawnList> lists = lists_of(data);
     drawn_ = {{glm::ivec2(0), size}};
     if (!lists_.empty()) {
