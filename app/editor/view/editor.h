@@ -179,6 +179,7 @@ struct Editor {
     std::filesystem::path output_folder = "out";
 
     std::map<std::string, SmallPicture> thumbnails;  // by port
+    std::vector<unsigned> replaced_textures;    // their names are taken until a frame without them was drawn
     std::vector<double> frame_seconds;          // of the newest frames that changed something, a ring
     std::vector<double> frame_cpu_seconds;      // of the window's thread
     std::size_t frames_drawn = 0;

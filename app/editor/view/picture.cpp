@@ -16,7 +16,7 @@ namespace {
 #define GL_CLAMP_TO_EDGE 0x812F
 #endif
 
-void upload(Picture& picture, const Image& image) { upload(picture, image.size(), pixels_of(image)); }
+void upload(Editor& editor, Picture& picture, const Image& image) { upload(editor, picture, image.size(), pixels_of(image)); }
 
 const Image* image_in(const LiveValue* value) {
     const ImagePtr* image = value ? std::get_if<ImagePtr>(&value->value) : nullptr;
@@ -25,12 +25,11 @@ const Image* image_in(const LiveValue* value) {
 
 }  // namespace
 
-void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
-    // Under another name than before: what draws it is told from what drew the one before.
-    GLuint texture = 0;
-    glGenTextures(1, &texture);
-    if (picture.texture) glDeleteTextures(1, &picture.texture);
-    picture.texture = texture;
+void upload(Editor& editor, Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels) {
+    // Under another name than before, and than that of any that the last frame drew: what draws it is told from
+    // what drew the one before.
+    if (picture.texture) editor.replaced_textures.push_back(picture.texture);
+    glGenTextures(1, &picture.texture);
     GLint before = 0;
     glGetIntegerv(GL_TEXTURE_BINDING_2D, &before);
     glBindTexture(GL_TEXTURE_2D, picture.texture);
@@ -54,10 +53,10 @@ std::vector<glm::u8vec4> pixels_of(const Image& image) {
     return pixels;
 }
 
-bool update_picture(Picture& picture, const LiveValue* value) {
+bool update_picture(Editor& editor, Picture& picture, const LiveValue* value) {
     const Image* image = image_in(value);
     if (!image) return false;
-    if (picture.serial != value->serial) upload(picture, *image);
+    if (picture.serial != value->serial) upload(editor, picture, *image);
     picture.serial = value->serial;
     return true;
 }
@@ -76,14 +75,20 @@ bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, s
         return difference_image(*x, *y, scale);
     });
     if (made && made != d.shown) {
-        upload(d.picture, *made);
+        upload(editor, d.picture, *made);
         d.shown = made;
     }
     why = "Computing…";
     return d.shown != nullptr;
 }
 
+void delete_replaced_textures(Editor& editor) {
+    glDeleteTextures(GLsizei(editor.replaced_textures.size()), editor.replaced_textures.data());
+    editor.replaced_textures.clear();
+}
+
 void delete_textures(Editor& editor) {
+    delete_replaced_textures(editor);
     auto release = [](Picture& picture) {
         if (picture.texture) glDeleteTextures(1, &picture.texture);
         picture = {};
@@ -115,7 +120,7 @@ SmallPicture* small_picture(Editor& editor, const std::string& node, const NodeP
         }
         SmallPicture& small = editor.thumbnails[name];
         if (made && made != small.thumbnail && made->size.x > 0) {
-            upload(small.picture, made->size, made->pixels);
+            upload(editor, small.picture, made->size, made->pixels);
             small.thumbnail = made;
         }
         return small.thumbnail ? &small : nullptr;

@@ -8,11 +8,13 @@
 namespace voxloom::editor {
 
 // Uploads where the value is another one. False where there is no picture.
-bool update_picture(Picture& picture, const LiveValue* value);
-void upload(Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels);
+bool update_picture(Editor& editor, Picture& picture, const LiveValue* value);
+void upload(Editor& editor, Picture& picture, glm::ivec2 size, const std::vector<glm::u8vec4>& pixels);
 // |a - b| * scale, made on another thread when one of them is another one; until then the last one stays.
 // False where there is none; the reason is then in `why`.
 bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, std::string& why);
+// After a frame was drawn: no frame to come draws what was replaced before.
+void delete_replaced_textures(Editor& editor);
 void delete_textures(Editor& editor);
 // The small picture of what a node gives, where there is one: of its first image, volume or bricks.
 SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports);

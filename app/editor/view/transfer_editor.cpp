@@ -117,7 +117,7 @@ void draw_gradients(const Scene& s) {
                 const double share = most > 0 ? std::log1p(made->counts[row * kHistogramBins + column]) / most : 0;
                 pixels.emplace_back(190, 205, 225, std::uint8_t(share * 200));
             }
-        upload(state.picture, {int(kHistogramBins), int(kGradientBins)}, pixels);
+        upload(s.editor, state.picture, {int(kHistogramBins), int(kGradientBins)}, pixels);
         state.shown = made;
     }
     ImGui::GetWindowDrawList()->AddImage(texture_of(state.picture), {s.place(s.share(range.min), 0).x, s.lo.y}, {s.place(s.share(range.max), 0).x, s.hi.y});

@@ -241,8 +241,8 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     const LiveValue* other = value_at(editor, ports[b]);
     std::string why;
     Picture* picture = &view.pictures[a];
-    bool there = update_picture(*picture, value);
-    const bool other_there = b != a && update_picture(view.pictures[b], other);
+    bool there = update_picture(editor, *picture, value);
+    const bool other_there = b != a && update_picture(editor, view.pictures[b], other);
     if (view.mode == Mode::difference) {
         there = update_difference(editor, value, other, why);
         picture = &view.difference.picture;

@@ -152,6 +152,7 @@ bool draw_frame(Editor& editor, GLFWwindow* window, KeptFrame& kept) {
     if (editor.screenshot_wanted && !kept.keeps()) kept.forget();
     // The canvas has the colour of what is behind it, and is not drawn again.
     const bool changed = kept.draw(*ImGui::GetDrawData(), size, ImGui::ColorConvertU32ToFloat4(theme().canvas));
+    delete_replaced_textures(editor);
     take_wanted_pictures(editor, size);
     if (changed) kept.show();
     return changed;
