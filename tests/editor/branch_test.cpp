@@ -132,8 +132,13 @@ TEST_F(Branches, measuresOfTheEditorStandInForNodesThatAreNotThere) {
     n = numbers_of(b, state, own);
     EXPECT_EQ(n.psnr, 41);
     EXPECT_EQ(n.image_rmse, 0.01);
+    EXPECT_FALSE(n.image_is_own);
     own.image_first = true;
     EXPECT_EQ(numbers_of(b, state, own).image_rmse, 0.125);
+    EXPECT_TRUE(numbers_of(b, state, own).image_is_own);
+    own.image = nullptr;
+    EXPECT_FALSE(numbers_of(b, state, own).image_rmse) << "the graph's is against another picture";
+    EXPECT_FALSE(numbers_of(b, state, own).image_max);
     decoded->problem = "corrupt";
     n = numbers_of(b, state, own);
     EXPECT_FALSE(n.ratio);
@@ -182,6 +187,20 @@ TEST(Decoding, measuresWhatAConstantErrorIs) {
         EXPECT_GT(alone->cpu_seconds, 0);
     }
     EXPECT_EQ(decode_all(make_dense_pyramid(wave(0, {1, 7, 1}), glm::ivec3(8), PyramidFilter::average), wave(0, {1, 7, 1}))->max_error, 0);
+}
+
+TEST_F(Branches, areComparedOnlyWithAnOriginalOfTheGraphAsItIs) {
+    const VolumePtr original = wave(0);
+    const BricksPtr bricks = make_dense_pyramid(original, glm::ivec3(8), PyramidFilter::average);
+    state.volumes["ct.volume"] = original;
+    state.bricks["code.bricks"] = bricks;
+    finish("ct", 1);
+    EXPECT_FALSE(compared_of(branch("view"), state).bricks);
+    finish("code", 1);
+    EXPECT_EQ(compared_of(branch("view"), state).bricks, bricks);
+    EXPECT_EQ(compared_of(branch("view"), state).original, Value(original));
+    state.nodes["ct"].state = NodeState::waiting;
+    EXPECT_EQ(compared_of(branch("view"), state).original, Value()) << "of an older graph";
 }
 
 TEST(Decoding, saysWhatIsWrongWithTheBricks) {

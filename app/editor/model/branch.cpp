@@ -127,7 +127,9 @@ BranchNumbers numbers_of(const Branch& b, const Evaluator::State& state, const O
     n.max_error = first_of(first_of(tabled(state, b.volume_error, "max_error"), decoded ? decoded->max_error : std::nullopt), measured(state, b.codec, "max error"));
     n.image_rmse = tabled(state, b.image_error, "rmse");
     n.image_max = tabled(state, b.image_error, "max_error");
-    if (own.image && (own.image_first || !n.image_rmse)) n.image_rmse = own.image->rmse, n.image_max = own.image->max_error;
+    if (own.image_first) n.image_rmse = n.image_max = {};  // they may be against another picture
+    n.image_is_own = own.image && !n.image_rmse;
+    if (n.image_is_own) n.image_rmse = own.image->rmse, n.image_max = own.image->max_error;
     n.encode = first_of(measured(state, b.codec, "codec time"), wall(state, b.codec));
     n.decode = decoded ? std::optional(decoded->cpu_seconds) : wall(state, b.decoder);
     if (decoded) n.decoded_bytes_per_second = decoded->bytes_per_second;
@@ -143,7 +145,7 @@ Compared compared_of(const Branch& b, const Evaluator::State& state) {
         return found == state.bricks.end() ? BricksPtr() : found->second.lock();
     };
     compared.bricks = bricks_at(b.bricks);
-    if (b.original.node.empty()) return compared;
+    if (!finished(state, b.original.node)) return compared;
     auto volume = state.volumes.find(name_of_port(b.original));
     if (VolumePtr original = volume == state.volumes.end() ? nullptr : volume->second.lock()) compared.original = original;
     else if (BricksPtr others = bricks_at(b.original)) compared.original = others;

@@ -38,6 +38,7 @@ struct BranchNumbers {
     // Of the volume: by volume_error, else measured here, else as the codec says.
     std::optional<double> psnr, max_error;
     std::optional<double> image_rmse, image_max;
+    bool image_is_own = false;  // they are OwnMeasures::image's
     // Seconds. Encoding is the codec's own processor time where it tells it, else its node's; decoding is
     // processor time measured here, else the decoder's node's; all are of the run that made what is shown,
     // whenever that was.

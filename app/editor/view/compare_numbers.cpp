@@ -84,10 +84,10 @@ constexpr std::pair<const char*, const char*> kRows[] = {
     {"frame", "The time of the picture's node."}};
 static_assert(std::size(kRows) + 1 == std::size_t(kNumberRows));
 
-void explain(std::size_t row, const OwnMeasures* own) {
+void explain(std::size_t row, const OwnMeasures* own, bool image_is_own) {
     std::string text = kRows[row].second;
     if (own && own->decoded && !own->decoded->problem.empty()) text += "\nThe bricks cannot be decoded: " + own->decoded->problem;
-    if (own && own->image && kRows[row].first == std::string_view("image RMSE"))
+    if (own && image_is_own && kRows[row].first == std::string_view("image RMSE"))
         text += fmt::format("\nPSNR {:.4g} dB, SSIM {:.5g}; {:.3g} % of the pixels are off by more than 1/255.", own->image->psnr, own->image->ssim,
                             100 * own->image->share_off);
     ImGui::SetTooltip("%s", text.c_str());
@@ -130,12 +130,12 @@ double numbers_width(std::size_t branches) { return kNames + (branches > 2 ? kCo
 void draw_numbers(Editor& editor, ImVec2 lo) {
     auto row_at = [&](std::size_t row) { return lo.y + ui(kStripLine * double(row)); };
     // Of the row that the pointer is in, from the left edge of a column on.
-    auto explain_in = [&](float x, double width, const OwnMeasures* own) {
+    auto explain_in = [&](float x, double width, const OwnMeasures* own, bool image_is_own) {
         for (std::size_t r = 0; r < std::size(kRows); ++r)
-            if (ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect({x, row_at(r + 1)}, {x + ui(width), row_at(r + 2)})) explain(r, own);
+            if (ImGui::IsWindowHovered() && ImGui::IsMouseHoveringRect({x, row_at(r + 1)}, {x + ui(width), row_at(r + 2)})) explain(r, own, image_is_own);
     };
     for (std::size_t r = 0; r < std::size(kRows); ++r) say_at({lo.x, row_at(r + 1)}, theme().muted, kRows[r].first, kNames - 6);
-    explain_in(lo.x, kNames, nullptr);
+    explain_in(lo.x, kNames, nullptr, false);
     const bool wide = editor.branches.size() <= 2;
     const double column = wide ? kWideColumn : kColumn;
     for (std::size_t k = 0; k < editor.branches.size(); ++k) {
@@ -148,7 +148,7 @@ void draw_numbers(Editor& editor, ImVec2 lo) {
         const float x = lo.x + ui(kNames + column * double(k));
         draw_title(editor, k, {x, lo.y}, column);
         for (std::size_t r = 0; r < std::size(texts); ++r) say_at({x, row_at(r + 1)}, theme().text, texts[r], column - 6);
-        explain_in(x, column, &own);
+        explain_in(x, column, &own, n.image_is_own);
     }
     mark(editor, "compare-table", lo, {lo.x + ui(numbers_width(editor.branches.size())), row_at(std::size(kRows) + 1)});
 }
