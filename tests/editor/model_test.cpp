@@ -2,15 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <random>
-#include <thread>
 
 #include "app/editor/model/autosave.h"
-#include "app/editor/model/background.h"
 #include "app/editor/model/camera_control.h"
 #include "app/editor/model/commands.h"
 #include "app/editor/model/histogram.h"
@@ -502,49 +498,6 @@ TEST(Thumbnail, showsTheCoarsestLevelOfBricksThatIsFineEnough) {
     EXPECT_EQ(small->pixels[64 * 70 + 69].r, 0);
     EXPECT_EQ(small_of({127, 127, 1}, [](auto...) { return 1; })->size, glm::ivec2(64, 64));
     EXPECT_EQ(small_of({40, 33, 17}, [](auto...) { return 1; })->size, glm::ivec2(40, 33));
-}
-
-TEST(Background, makesWhatIsAskedForOnceAndKeepsIt) {
-    std::atomic<int> changes{0}, calls{0};
-    Background<int> background([&] { ++changes; }, 2);
-    const auto a = std::make_shared<int>(1), b = std::make_shared<int>(2);
-    auto made = [&](std::shared_ptr<int> of, double number) {
-        for (int i = 0; i < 5000; ++i) {
-            auto found = background.find({of, {}, number}, [of, number, &calls](const std::stop_token&) {
-                ++calls;
-                return std::make_shared<const int>(*of * 10 + int(number));
-            });
-            if (found) return *found;
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        }
-        return -1;
-    };
-    EXPECT_EQ(made(a, 0), 10);
-    EXPECT_EQ(made(b, 0), 20);
-    EXPECT_EQ(made(a, 0), 10);
-    EXPECT_EQ(calls, 2);
-    EXPECT_EQ(made(a, 5), 15) << "another number is another thing; the oldest goes";
-    EXPECT_EQ(made(b, 0), 20);
-    EXPECT_EQ(calls, 4);
-    // What cannot be made is not tried again and again.
-    std::atomic<int> tries{0};
-    auto failing = [&](const std::stop_token&) -> std::shared_ptr<const int> {
-        ++tries;
-        throw Error("no");
-    };
-    EXPECT_EQ(background.find({b, a, 1}, failing), nullptr);
-    for (int i = 0; i < 5000 && tries == 0; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    EXPECT_EQ(background.find({b, a, 1}, failing), nullptr);
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    EXPECT_EQ(tries, 1);
-    // Nor does one that was cancelled on the way keep others from being made.
-    auto cancelled = [&](const std::stop_token&) -> std::shared_ptr<const int> {
-        ++tries;
-        throw Cancelled();
-    };
-    EXPECT_EQ(background.find({a, b, 2}, cancelled), nullptr);
-    for (int i = 0; i < 5000 && tries == 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    EXPECT_EQ(made(a, 7), 17);
 }
 
 // --- the camera ----------------------------------------------------------------------------------

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -32,6 +33,14 @@ class Background {
   public:
     using Result = std::shared_ptr<const Made>;
     using Make = std::function<Result(const std::stop_token&)>;
+    struct Found {
+        enum class State { pending, made, failed };
+        State state = State::pending;
+        Result made;          // what `make` gave; null in the other states
+        std::string problem;  // the sentence of a failure
+
+        bool pending() const { return state == State::pending; }
+    };
 
     // `changed` is called from the thread when something was made.
     explicit Background(std::function<void()> changed, std::size_t most_kept = 64)
@@ -43,31 +52,40 @@ class Background {
     Background(const Background&) = delete;
     Background& operator=(const Background&) = delete;
 
-    // The thing, or null until it is made, which asking begins: what is asked for last is made first. Null
-    // for ever where `make` throws: what it is made of has said what is wrong with it. Without `make` nothing
-    // begins, and what is there is found.
-    Result find(const MadeOf& of, Make make) {
+    // Pending until it is made, which asking begins: what is asked for last is made first. Where `make` throws it
+    // has failed, and is not tried again. Without `make` nothing begins, and what is there is found.
+    Found find(const MadeOf& of, Make make) {
         std::lock_guard lock(mutex_);
         for (auto entry = entries_.begin(); entry != entries_.end(); ++entry) {
             if (!(entry->of == of)) continue;
             entries_.splice(entries_.begin(), entries_, entry);
-            return entry->result;
+            return entry->found;
         }
-        if (!make) return nullptr;
+        if (!make) return {};
         // What is made of something that is gone will not be asked for again.
         std::erase_if(entries_, [](const Entry& entry) { return !entry.make && entry.of.a.expired(); });
-        entries_.push_front({of, std::move(make), nullptr});
+        entries_.push_front({of, std::move(make), {}});
         if (entries_.size() > most_kept_) entries_.pop_back();
         wake_.notify_all();
-        return nullptr;
+        return {};
     }
 
   private:
     struct Entry {
         MadeOf of;
         Make make;  // empty once it was called
-        Result result;
+        Found found;
     };
+
+    static Found made_or_failed(const Make& make, const std::stop_token& stop) {
+        try {
+            return {Found::State::made, make(stop), {}};
+        } catch (const std::exception& e) {
+            return {Found::State::failed, nullptr, e.what()};
+        } catch (...) {
+            return {Found::State::failed, nullptr, "an exception of an unknown type: a defect of a plugin"};
+        }
+    }
 
     Entry* next() {
         for (Entry& entry : entries_)
@@ -82,17 +100,12 @@ class Background {
             const MadeOf of = next()->of;
             Make make = std::exchange(next()->make, nullptr);
             lock.unlock();
-            Result result;
-            try {
-                result = make(stop);
-            } catch (const std::exception&) {
-                if (stop.stop_requested()) return;
-                result = nullptr;
-            }
+            Found found = made_or_failed(make, stop);
+            if (stop.stop_requested()) return;
             make = nullptr;  // gives back what it is made of
             lock.lock();
             for (Entry& entry : entries_)
-                if (entry.of == of) entry.result = std::move(result);
+                if (entry.of == of) entry.found = std::move(found);
             if (changed_) changed_();
         }
     }

@@ -29,6 +29,7 @@ struct OwnMeasures {
     std::shared_ptr<const Decoded> decoded;
     std::shared_ptr<const ImageError> image;  // of the picture, against the reference that is chosen
     bool decoding = false, comparing = false; // it is not there yet, but will be
+    std::string decode_problem, image_problem; // why it never will be
     bool image_first = false;                 // somebody has chosen it: rather this than what image_error says
 };
 

@@ -38,14 +38,18 @@ OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& referen
     own.image_first = editor.viewport.against != Against::first;
     if (const Compared c = compared_of(branch, editor.live); c.bricks) {
         auto make = [c](const std::stop_token& stop) { return decode_all(c.bricks, c.original, stop); };
-        own.decoded = editor.decoded.find({c.bricks, address_of(c.original)}, begin ? Background<Decoded>::Make(make) : nullptr);
-        own.decoding = !own.decoded;
+        const auto found = editor.decoded.find({c.bricks, address_of(c.original)}, begin ? Background<Decoded>::Make(make) : nullptr);
+        own.decoded = found.made;
+        own.decoding = found.pending();
+        own.decode_problem = found.made ? found.made->problem : found.problem;
     }
     const ImagePtr image = fresh_image(editor, branch.picture), other = fresh_image(editor, reference);
     if (!image || !other || !problem_with_comparison(image->size(), other->size()).empty()) return own;
     auto make = [image, other](const std::stop_token&) { return std::make_shared<const ImageError>(compare_images(*image, *other)); };
-    own.image = editor.image_errors.find({image, other}, begin ? Background<ImageError>::Make(make) : nullptr);
-    own.comparing = !own.image;
+    const auto found = editor.image_errors.find({image, other}, begin ? Background<ImageError>::Make(make) : nullptr);
+    own.image = found.made;
+    own.comparing = found.pending();
+    own.image_problem = found.problem;
     return own;
 }
 
@@ -84,10 +88,13 @@ constexpr std::pair<const char*, const char*> kRows[] = {
     {"frame", "The time of the picture's node."}};
 static_assert(std::size(kRows) + 1 == std::size_t(kNumberRows));
 
+// What a row means, and of a column what more is known: `own` is null beside the columns.
 void explain(std::size_t row, const OwnMeasures* own, bool image_is_own) {
     std::string text = kRows[row].second;
-    if (own && own->decoded && !own->decoded->problem.empty()) text += "\nThe bricks cannot be decoded: " + own->decoded->problem;
-    if (own && image_is_own && kRows[row].first == std::string_view("image RMSE"))
+    const bool image = kRows[row].first == std::string_view("image RMSE");
+    if (own && !image && !own->decode_problem.empty()) text += "\nThe bricks cannot be decoded: " + own->decode_problem;
+    if (own && image && !own->image_problem.empty()) text += "\nThe pictures cannot be compared: " + own->image_problem;
+    if (own && image && image_is_own)
         text += fmt::format("\nPSNR {:.4g} dB, SSIM {:.5g}; {:.3g} % of the pixels are off by more than 1/255.", own->image->psnr, own->image->ssim,
                             100 * own->image->share_off);
     ImGui::SetTooltip("%s", text.c_str());

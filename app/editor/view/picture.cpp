@@ -71,15 +71,15 @@ bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, s
     Difference& d = editor.viewport.difference;
     const ImagePtr x = std::get<ImagePtr>(a->value), y = std::get<ImagePtr>(b->value);
     const double scale = d.scale;
-    const ImagePtr made = editor.differences.find({x, y, scale}, [x, y, scale](const std::stop_token&) -> ImagePtr {
+    const auto found = editor.differences.find({x, y, scale}, [x, y, scale](const std::stop_token&) -> ImagePtr {
         return difference_image(*x, *y, scale);
     });
-    if (made && made != d.shown) {
-        upload(editor, d.picture, *made);
-        d.shown = made;
+    if (found.made && found.made != d.shown) {
+        upload(editor, d.picture, *found.made);
+        d.shown = found.made;
     }
-    why = "Computing…";
-    return d.shown != nullptr;
+    why = found.pending() ? "Computing…" : found.problem;
+    return d.shown != nullptr && (found.made || found.pending());
 }
 
 void delete_replaced_textures(Editor& editor) {
@@ -108,13 +108,13 @@ SmallPicture* small_picture(Editor& editor, const std::string& node, const NodeP
             if (!image) continue;
             // While something moves the last whole picture stays.
             if (value->second.fresh)
-                made = editor.small_pictures.find({*image}, [image = *image](const std::stop_token&) { return thumbnail_of(*image); });
+                made = editor.small_pictures.find({*image}, [image = *image](const std::stop_token&) { return thumbnail_of(*image); }).made;
         } else if (auto found = editor.live.volumes.find(name); found != editor.live.volumes.end()) {
             if (const VolumePtr volume = found->second.lock())
-                made = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); });
+                made = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); }).made;
         } else if (auto compressed = editor.live.bricks.find(name); compressed != editor.live.bricks.end()) {
             if (const BricksPtr bricks = compressed->second.lock())
-                made = editor.small_pictures.find({bricks}, [bricks](const std::stop_token& stop) { return thumbnail_of(bricks, BrickCache::global(), stop); });
+                made = editor.small_pictures.find({bricks}, [bricks](const std::stop_token& stop) { return thumbnail_of(bricks, BrickCache::global(), stop); }).made;
         } else {
             continue;
         }

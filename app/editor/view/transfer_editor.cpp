@@ -71,7 +71,7 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     if (const VolumePtr volume = s.data)
         s.histogram = editor.histograms.find({volume}, [volume](const std::stop_token& stop) {
             return std::make_shared<const Histogram>(histogram_of(*volume, stop));
-        });
+        }).made;
     if (s.histogram) s.range = s.histogram->range;
     else if (s.function && s.function->one.points.size() > 1)
         s.range = {s.function->one.points.front().value, s.function->one.points.back().value};
@@ -107,7 +107,7 @@ void draw_gradients(const Scene& s) {
     const ValueRange range = s.histogram->range;
     const auto made = s.editor.gradients.find({volume}, [volume, range](const std::stop_token& stop) {
         return std::make_shared<const GradientHistogram>(gradient_histogram_of(*volume, range, stop));
-    });
+    }).made;
     if (!made) return;
     if (made != state.shown) {
         const double most = std::log1p(*std::ranges::max_element(made->counts));

@@ -198,7 +198,7 @@ std::string why_empty(const Editor& editor, const WireEnd& port) {
     return editor.live.busy ? "Computing…" : "Nothing here yet.";
 }
 
-// For the status line, and until it is known nothing.
+// For the status line: nothing until it is known, and why where it never will be.
 void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& value, const ImagePtr& image, glm::dvec2 at) {
     const glm::ivec2 pixel(glm::floor(at)), size = image->size();
     if (!value.fresh || pixel.x < 0 || pixel.y < 0 || pixel.x >= size.x || pixel.y >= size.y) return;
@@ -206,15 +206,17 @@ void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& valu
     if (!scene) return;
     // What cannot be read by region is loaded once, as long as it is the same.
     if (const VolumePtr volume = scene->volume; !volume->reads_by_region()) {
-        scene->volume = editor.loaded.find({volume}, [volume](const std::stop_token& stop) { return in_memory(volume, stop); });
-        if (!scene->volume) return;
+        const auto loaded = editor.loaded.find({volume}, [volume](const std::stop_token& stop) { return in_memory(volume, stop); });
+        editor.picked = loaded.problem;
+        if (!loaded.made) return;
+        scene->volume = loaded.made;
     }
     const std::string unit = scene->volume->desc().unit;
     const double number = double(pixel.y) * size.x + pixel.x;
     const auto picked = editor.picks.find({image, {}, number}, [scene = std::move(*scene), pixel, size](const std::stop_token& stop) {
         return pick(scene, pixel, size, stop);
     });
-    if (picked) editor.picked = text_of(*picked, unit);
+    editor.picked = picked.made ? text_of(*picked.made, unit) : picked.problem;
 }
 
 // A rectangle of the window with the pictures `shown` in it: one, or two over each other.
