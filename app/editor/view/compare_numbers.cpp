@@ -32,13 +32,14 @@ std::shared_ptr<const void> address_of(const Value& value) {
     return nullptr;
 }
 
-// Begun when nothing else runs: what moves will be another one soon, and times would be those of a busy machine.
-OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& reference, bool begin) {
+// Only while nothing else runs, else it is stopped and begins anew at rest: it would take processors from the graph, what
+// moves will be another one soon, and times would be those of a busy machine.
+OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& reference, bool at_rest) {
     OwnMeasures own;
     own.image_first = editor.viewport.against != Against::first;
     if (const Compared c = compared_of(branch, editor.live); c.bricks) {
         auto make = [c](const std::stop_token& stop) { return decode_all(c.bricks, c.original, stop); };
-        const auto found = editor.decoded.find({c.bricks, address_of(c.original)}, begin ? Background<Decoded>::Make(make) : nullptr);
+        const auto found = editor.decoded.find({c.bricks, address_of(c.original)}, at_rest ? Background<Decoded>::Make(make) : nullptr);
         own.decoded = found.made;
         own.decoding = found.pending();
         own.decode_problem = found.made ? found.made->problem : found.problem;
@@ -46,7 +47,7 @@ OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& referen
     const ImagePtr image = fresh_image(editor, branch.picture), other = fresh_image(editor, reference);
     if (!image || !other || !problem_with_comparison(image->size(), other->size()).empty()) return own;
     auto make = [image, other](const std::stop_token&) { return std::make_shared<const ImageError>(compare_images(*image, *other)); };
-    const auto found = editor.image_errors.find({image, other}, begin ? Background<ImageError>::Make(make) : nullptr);
+    const auto found = editor.image_errors.find({image, other}, at_rest ? Background<ImageError>::Make(make) : nullptr);
     own.image = found.made;
     own.comparing = found.pending();
     own.image_problem = found.problem;

@@ -305,6 +305,11 @@ void draw_message(Editor& editor) {
     mark(editor, "message", at, hi);
 }
 
+void let_go_of_unasked(Editor& editor) {
+    auto each = [](auto&... backgrounds) { (backgrounds.let_go_of_unasked(), ...); };
+    each(editor.histograms, editor.gradients, editor.small_pictures, editor.differences, editor.decoded, editor.image_errors, editor.picks);
+}
+
 }  // namespace
 
 void draw(Editor& editor) {
@@ -337,6 +342,7 @@ void draw(Editor& editor) {
     editor.autosave.update(editor.work, ImGui::GetTime());
     editor.moving = editor.moving || ImGui::GetTime() < editor.moving_until;
     submit_changes(editor);
+    let_go_of_unasked(editor);
 }
 
 // --- toolbar and status bar ----------------------------------------------------------------------
