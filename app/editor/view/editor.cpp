@@ -61,6 +61,7 @@ void begin_document(Editor& editor, Workspace work) {
     editor.id_of.clear();
     editor.tried.clear();
     editor.sweep.reset();
+    editor.loaded.clear();
     for (Picture& picture : editor.viewport.pictures) picture.port = {};
     editor.viewport.against = Viewport::Against::first;
     editor.viewport.zoom = 0;
@@ -305,9 +306,14 @@ void draw_message(Editor& editor) {
     mark(editor, "message", at, hi);
 }
 
+// Where the pointer rests on a picture its volume is asked for in every frame. What had to be loaded whole for that waits for
+// it to come back, no longer than this; a window at rest looks every few seconds.
+constexpr double kKeepLoadedSeconds = 30;
+
 void let_go_of_unasked(Editor& editor) {
     auto each = [](auto&... backgrounds) { (backgrounds.let_go_of_unasked(), ...); };
     each(editor.histograms, editor.gradients, editor.small_pictures, editor.differences, editor.decoded, editor.image_errors, editor.picks);
+    if (ImGui::GetTime() > editor.loaded_used + kKeepLoadedSeconds) editor.loaded.clear();
 }
 
 }  // namespace

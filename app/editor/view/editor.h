@@ -193,7 +193,8 @@ struct Editor {
     Background<Image> differences;
     Background<Decoded> decoded;
     Background<ImageError> image_errors;
-    Background<Volume> loaded;  // to be picked from
+    Background<Volume> loaded;  // one, whole, to be picked from
+    double loaded_used = 0;     // when that was last done
     Background<Picked> picks;   // few: the pointer soon is elsewhere
     Evaluator evaluator;        // the last: it ends first
 };

@@ -204,9 +204,10 @@ void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& valu
     if (!value.fresh || pixel.x < 0 || pixel.y < 0 || pixel.x >= size.x || pixel.y >= size.y) return;
     std::optional<PickScene> scene = pick_scene(editor.work.graph(), editor.registry, port.node, editor.live);
     if (!scene) return;
-    // What cannot be read by region is loaded once, as long as it is the same.
+    // What cannot be read by region is loaded once, as long as it is the same one.
     if (const VolumePtr volume = scene->volume; !volume->reads_by_region()) {
         const auto loaded = editor.loaded.find({volume}, [volume](const std::stop_token& stop) { return in_memory(volume, stop); });
+        editor.loaded_used = ImGui::GetTime();
         editor.picked = loaded.problem;
         if (!loaded.made) return;
         scene->volume = loaded.made;
