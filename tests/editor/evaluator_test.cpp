@@ -123,6 +123,28 @@ TEST_F(Live, aFailingNodeSaysItsSentence) {
     EXPECT_EQ(state.nodes.at("table").state, NodeState::done) << "the other branch goes on";
 }
 
+TEST_F(Live, isBusyFromTheRequestOnUntilNothingIsLeftToDo) {
+    auto busy_until = [&](auto&& there) {
+        submit();
+        for (int i = 0; i < 50000; ++i) {
+            evaluator.refresh(state);
+            if (there()) return;
+            ASSERT_TRUE(state.busy);
+            std::this_thread::sleep_for(std::chrono::microseconds(100));
+        }
+        FAIL() << "it never was";
+    };
+    document.set_param("add", "milliseconds", 60000.0);
+    for (double amount : {1.0, 2.0}) {  // the second supersedes the first
+        document.set_param("add", "amount", amount);
+        busy_until([&] { return state.graph && same_content(*state.graph, document.graph()) && state.nodes.at("add").state == NodeState::running; });
+        EXPECT_TRUE(state.busy);
+    }
+    document.set_param("add", "milliseconds", 1.0);
+    busy_until([&] { return !state.busy; });
+    EXPECT_EQ(shown(), 3 + 2);
+}
+
 TEST_F(Live, stopsWhenAsked) {
     document.set_param("add", "milliseconds", 60000.0);
     submit();

@@ -75,7 +75,10 @@ struct Window : ::testing::Test {
 TEST_F(Window, aGraphIsOpenedTunedUndoneSavedAndRunsToTheSamePicture) {
     VirtualDisplay display(1280, 720);
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
-    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    editor.wait_for("a picture", [](const json& s) {
+        EXPECT_TRUE(s["busy"].get<bool>() || shows_final(s, "view.image")) << "it is not at rest before";
+        return shows_final(s, "view.image");
+    });
 
     editor.click("node:camera");
     json s = editor.with("param:camera.azimuth");

@@ -57,6 +57,9 @@ const NodeStatus* status_of(const Editor& editor, const std::string& node) {
 void begin_document(Editor& editor, Workspace work) {
     close_drag_step(editor);
     editor.work = std::move(work);
+    // Nothing is known of it yet; it is handed to the evaluator when the frame ends.
+    editor.live = {};
+    editor.live.busy = true;
     editor.texts.clear();
     editor.id_of.clear();
     editor.tried.clear();

@@ -176,8 +176,7 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
     set_theme(editor, screen_scale);
     // A file that cannot be read is said before there is anything to lose.
     if (!arguments.graph.empty()) {
-        editor.work = open_workspace(arguments.graph);
-        editor.start_page = false;
+        begin_document(editor, open_workspace(arguments.graph));
         remember(editor.settings, arguments.graph);
         save_settings(editor.settings, editor.settings_file);
     }
