@@ -81,7 +81,7 @@ int decompress(const DecompressArguments& arguments, std::stop_token stop);
 struct EditArguments {
     std::filesystem::path graph;             // empty: the start page
     std::filesystem::path out = "out";
-    std::string size = "1600x960";           // of the window
+    std::string size;                        // of the window; empty: as it fits the screen
     double scale = 0;                        // 0: the screen's own
     std::filesystem::path screen;            // where to write what is on the screen; empty: nowhere
 };

@@ -10,13 +10,24 @@
 
 namespace voxloom::cli {
 
+#if defined(VOXLOOM_EDITOR)
+namespace {
+
+glm::ivec2 window_size(const std::string& text) {
+    glm::ivec2 size;
+    char end = 0;
+    if (std::sscanf(text.c_str(), "%dx%d%c", &size.x, &size.y, &end) != 2 || size.x < 320 || size.y < 240 || size.x > 16384 || size.y > 16384)
+        fail("--size {}: write WIDTHxHEIGHT, from 320x240 to 16384x16384", text);
+    return size;
+}
+
+}  // namespace
+#endif
+
 int edit(const EditArguments& arguments, std::stop_token stop) {
 #if defined(VOXLOOM_EDITOR)
     editor::EditArguments window;
-    char end = 0;
-    if (std::sscanf(arguments.size.c_str(), "%dx%d%c", &window.size.x, &window.size.y, &end) != 2 ||
-        window.size.x < 320 || window.size.y < 240 || window.size.x > 16384 || window.size.y > 16384)
-        fail("--size {}: write WIDTHxHEIGHT, from 320x240 to 16384x16384", arguments.size);
+    if (!arguments.size.empty()) window.size = window_size(arguments.size);
     window.graph = arguments.graph;
     window.out = arguments.out;
     window.stop = std::move(stop);

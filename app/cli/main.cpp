@@ -169,7 +169,7 @@ int main(int argc, char** argv) {
     command = app.add_subcommand("edit", "Wire, tune and look at a graph in a window");
     command->add_option("graph", edit.graph, "The graph (YAML); without, a page to start from");
     command->add_option("--out", edit.out, "Folder for written files and screenshots")->capture_default_str();
-    command->add_option("--size", edit.size, "WIDTHxHEIGHT of the window")->capture_default_str();
+    command->add_option("--size", edit.size, "WIDTHxHEIGHT of the window; 1600x960 without it, or as much of it as the screen has");
     command->add_option("--scale", edit.scale, "Pixels a unit of the interface; 0: the screen's own")
         ->check(CLI::Range(0.0, 8.0))->capture_default_str();
     command->add_option("--screen", edit.screen,

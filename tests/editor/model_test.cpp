@@ -304,6 +304,23 @@ TEST(Layout, nothingOverlapsAndSourcesStandLeft) {
     EXPECT_FALSE(work.graph().nodes[0].at);
 }
 
+TEST(Layout, putsPartsWithoutWiresBetweenThemBesideEachOther) {
+    Workspace work = workspace_of(kChain);
+    for (int i = 0; i < 40; ++i) {
+        const std::string source = add_node(work, registry(), type("fake.source"), {}), add = add_node(work, registry(), type("fake.add"), {});
+        connect(work, registry(), {source, "volume", {}}, {add, "volume", {}});
+    }
+    arrange(work, registry());
+    const auto boxes = boxes_of(work.graph(), ports_of(work.graph(), registry()));
+    glm::dvec2 lo(1e300), hi(-1e300);
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+        lo = glm::min(lo, boxes[i].at), hi = glm::max(hi, boxes[i].at + boxes[i].size);
+        for (std::size_t k = 0; k < i; ++k) EXPECT_FALSE(boxes[i].overlaps(boxes[k].at, boxes[k].at + boxes[k].size)) << i << " " << k;
+    }
+    EXPECT_LT((hi - lo).x, 3 * (hi - lo).y);
+    EXPECT_LT((hi - lo).y, 2 * (hi - lo).x);
+}
+
 TEST(Layout, acceptsCyclesAndEmptyGraphs) {
     EXPECT_TRUE(auto_layout({}, {}).empty());
     Workspace work = workspace_of("voxloom: 1\nnodes:\n  - { id: a, type: fake.add, in: { volume: b.volume } }\n"

@@ -124,10 +124,10 @@ void move_selected(Workspace& workspace, const std::vector<NodeBox>& boxes, glm:
     std::vector<std::pair<std::string, glm::dvec2>> places;
     for (std::size_t i = 0; i < boxes.size(); ++i)
         if (const std::string& id = workspace.graph().nodes[i].id; workspace.selected.count(id))
-            places.emplace_back(id, snapped(boxes[i].at + by));
+            places.emplace_back(id, glm::round(boxes[i].at + by));
     std::vector<Comment> comments = comments_of(workspace.graph());
     for (std::size_t i : workspace.selected_comments)
-        if (i < comments.size()) comments[i].at = snapped(comments[i].at + by);
+        if (i < comments.size()) comments[i].at = glm::round(comments[i].at + by);
     Document::Step step(workspace.document);
     workspace.document.move_nodes(places);
     if (!workspace.selected_comments.empty()) set_comments(workspace.document, comments);
@@ -142,18 +142,21 @@ void arrange(Workspace& workspace, const Registry& registry) {
 
 void align_selected(Workspace& workspace, const Registry& registry) {
     const auto boxes = boxes_of(workspace.graph(), ports_of(workspace.graph(), registry));
+    std::vector<NodeBox> others;
     std::vector<std::pair<double, std::size_t>> order;
-    for (std::size_t i = 0; i < boxes.size(); ++i)
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
         if (workspace.selected.count(workspace.graph().nodes[i].id)) order.emplace_back(boxes[i].at.y, i);
+        else others.push_back(boxes[i]);
+    }
     if (order.size() < 2) return;
     std::sort(order.begin(), order.end());
     double x = boxes[order.front().second].at.x, y = order.front().first;
     for (auto& [top, i] : order) x = std::min(x, boxes[i].at.x);
     std::vector<std::pair<std::string, glm::dvec2>> places;
     for (auto& [top, i] : order) {
-        y = std::max(y, top);
-        places.emplace_back(workspace.graph().nodes[i].id, snapped({x, y}));
-        y = places.back().second.y + boxes[i].size.y + 3 * kSnap;
+        const glm::dvec2 at = free_place(others, {x, std::max(y, top)}, boxes[i].size);
+        places.emplace_back(workspace.graph().nodes[i].id, at);
+        y = at.y + boxes[i].size.y + 3 * kSnap;
     }
     workspace.document.move_nodes(places);
 }

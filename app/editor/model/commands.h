@@ -38,7 +38,7 @@ void toggle_use(Workspace& workspace, GraphNode::Use use);
 void move_selected(Workspace& workspace, const std::vector<NodeBox>& boxes, glm::dvec2 by);
 // Every node where auto_layout() puts it.
 void arrange(Workspace& workspace, const Registry& registry);
-// The selected nodes, one below the other, left edges aligned.
+// The selected nodes, one below the other, left edges aligned; below what else stands there.
 void align_selected(Workspace& workspace, const Registry& registry);
 
 // The selected nodes and comments as a graph of their own, with the wires between them, and with the

@@ -41,6 +41,75 @@ std::vector<int> columns_of(const std::vector<std::vector<std::size_t>>& sources
     return column;
 }
 
+// Nodes that wires lead between, in the order of the first of each.
+std::vector<std::vector<std::size_t>> parts_of(const std::vector<std::vector<std::size_t>>& sources) {
+    std::vector<std::size_t> above(sources.size());
+    std::iota(above.begin(), above.end(), std::size_t(0));
+    auto root = [&](std::size_t i) {
+        while (above[i] != i) i = above[i] = above[above[i]];
+        return i;
+    };
+    for (std::size_t i = 0; i < sources.size(); ++i)
+        for (std::size_t from : sources[i]) above[root(i)] = root(from);
+    std::map<std::size_t, std::size_t> part;
+    std::vector<std::vector<std::size_t>> parts;
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        const std::size_t k = part.emplace(root(i), parts.size()).first->second;
+        if (k == parts.size()) parts.emplace_back();
+        parts[k].push_back(i);
+    }
+    return parts;
+}
+
+// Each column is sorted by the mean height of what feeds it, which keeps most wires from crossing.
+void place_in_columns(const std::vector<std::size_t>& part, const std::vector<std::vector<std::size_t>>& sources,
+                      const std::vector<int>& column, const std::vector<glm::dvec2>& size, std::vector<glm::dvec2>& at) {
+    std::map<int, std::vector<std::size_t>> columns;
+    for (std::size_t i : part) columns[column[i]].push_back(i);
+    for (auto& [c, nodes] : columns) {
+        std::map<std::size_t, double> pull;
+        for (std::size_t i : nodes) {
+            for (std::size_t from : sources[i]) pull[i] += at[from].y;
+            if (!sources[i].empty()) pull[i] /= double(sources[i].size());
+        }
+        if (c > 0) std::stable_sort(nodes.begin(), nodes.end(), [&](std::size_t a, std::size_t b) { return pull[a] < pull[b]; });
+        double height = -kRowGap;
+        for (std::size_t i : nodes) height += size[i].y + kRowGap;
+        double y = -height / 2;
+        for (std::size_t i : nodes) {
+            at[i] = {double(c) * (kNodeWidth + kColumnGap), y};
+            y += size[i].y + kRowGap;
+        }
+    }
+}
+
+// Parts that no wire leads between stand beside each other, in rows that make the whole about as wide as a
+// screen is, not all below each other.
+void place_in_rows(const std::vector<std::vector<std::size_t>>& parts, const std::vector<glm::dvec2>& size, std::vector<glm::dvec2>& at) {
+    struct Extent {
+        glm::dvec2 lo{1e300}, hi{-1e300};
+    };
+    std::vector<Extent> extents(parts.size());
+    double area = 0, room = 0;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+        Extent& e = extents[k];
+        for (std::size_t i : parts[k]) e.lo = glm::min(e.lo, at[i]), e.hi = glm::max(e.hi, at[i] + size[i]);
+        const glm::dvec2 whole = e.hi - e.lo + glm::dvec2(kColumnGap, 2 * kRowGap);
+        area += whole.x * whole.y;
+        room = std::max(room, whole.x);
+    }
+    room = std::max(room, std::sqrt(1.6 * area));
+    glm::dvec2 next(0.0);
+    double below = 0;
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+        const glm::dvec2 whole = extents[k].hi - extents[k].lo + glm::dvec2(kColumnGap, 2 * kRowGap);
+        if (next.x > 0 && next.x + whole.x > room) next = {0, below};
+        for (std::size_t i : parts[k]) at[i] += next - extents[k].lo;
+        next.x += whole.x;
+        below = std::max(below, next.y + whole.y);
+    }
+}
+
 }  // namespace
 
 glm::dvec2 NodeBox::input(int i) const { return at + glm::dvec2(0, kHeaderHeight + (i + 0.5) * kRowHeight); }
@@ -84,32 +153,13 @@ std::vector<NodeBox> boxes_of(const Graph& graph, const std::vector<NodePorts>& 
 
 std::vector<glm::dvec2> auto_layout(const Graph& graph, const std::vector<NodePorts>& ports) {
     const auto sources = sources_of(graph);
+    std::vector<glm::dvec2> size, at(sources.size(), glm::dvec2(0.0));
+    for (const NodePorts& p : ports) size.push_back(node_size(p));
     const std::vector<int> column = columns_of(sources);
-    const std::size_t n = sources.size();
-    std::vector<std::vector<std::size_t>> columns;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (columns.size() <= std::size_t(column[i])) columns.resize(std::size_t(column[i]) + 1);
-        columns[std::size_t(column[i])].push_back(i);
-    }
-    std::vector<glm::dvec2> at(n, glm::dvec2(0.0));
-    // Each column is sorted by the mean height of what feeds it, which keeps most wires from crossing.
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-        std::vector<double> pull(n, 0.0);
-        for (std::size_t i : columns[c]) {
-            for (std::size_t from : sources[i]) pull[i] += at[from].y;
-            if (!sources[i].empty()) pull[i] /= double(sources[i].size());
-        }
-        if (c > 0)
-            std::stable_sort(columns[c].begin(), columns[c].end(),
-                             [&](std::size_t a, std::size_t b) { return pull[a] < pull[b]; });
-        double height = -kRowGap;
-        for (std::size_t i : columns[c]) height += node_size(ports[i]).y + kRowGap;
-        double y = -height / 2;
-        for (std::size_t i : columns[c]) {
-            at[i] = snapped({double(c) * (kNodeWidth + kColumnGap), y});
-            y += node_size(ports[i]).y + kRowGap;
-        }
-    }
+    const auto parts = parts_of(sources);
+    for (const auto& part : parts) place_in_columns(part, sources, column, size, at);
+    if (parts.size() > 1) place_in_rows(parts, size, at);
+    for (glm::dvec2& p : at) p = snapped(p);
     return at;
 }
 

@@ -28,7 +28,8 @@ glm::dvec2 node_size(const NodePorts& ports);
 // By index of graph.nodes.
 std::vector<NodeBox> boxes_of(const Graph& graph, const std::vector<NodePorts>& ports);
 
-// Sources left, consumers right, in columns; nothing overlaps, and wires cross seldom.
+// Sources left, consumers right, in columns; nothing overlaps, and wires cross seldom. Parts that no wire
+// leads between stand beside each other.
 std::vector<glm::dvec2> auto_layout(const Graph& graph, const std::vector<NodePorts>& ports);
 
 // The place nearest to `wanted`, going down, where a node of this size covers no other.

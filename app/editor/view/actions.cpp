@@ -178,6 +178,11 @@ std::vector<Action> make_actions() {
          [](E& e) { e.screenshot_wanted = true; }},
         {"picture-file", "Picture", "Save picture", "Saves the shown picture, at its own size, as a PNG file in the output folder.", GLFW_KEY_F11, false, false,
          [](E& e) { e.picture_wanted = true; }},
+        {"large", "View", "Large", "The pictures take the graph's place; again, and it is back.", GLFW_KEY_SPACE, true, false,
+         [](E& e) {
+             e.large_picture = !e.large_picture;
+             e.canvas.drag = Canvas::Drag::none;
+         }},
         {"expert", "View", "Expert", "Shows the parameters for experts, too.", GLFW_KEY_E, true, false,
          [](E& e) { e.show_expert = !e.show_expert; }},
         {"problems", "View", "Problems", "Lists everything that is wrong with the graph.", GLFW_KEY_P, false, false,
@@ -211,6 +216,7 @@ std::string key_text(const Action& a) {
         case GLFW_KEY_DELETE: name = "Delete"; break;
         case GLFW_KEY_TAB: name = "Tab"; break;
         case GLFW_KEY_ESCAPE: name = "Escape"; break;
+        case GLFW_KEY_SPACE: name = "Space"; break;
         case GLFW_KEY_HOME: name = "Home"; break;
         case GLFW_KEY_EQUAL: name = "+"; break;
         default:

@@ -27,6 +27,7 @@ void update_boxes(Editor& editor) {
 
 void do_fit(Canvas& canvas) {
     canvas.fit_wanted = false;
+    canvas.fitted = true;
     if (canvas.boxes.empty() && canvas.comment_boxes.empty()) {
         canvas.zoom = 1;
         canvas.pan = -canvas.size / (2.0 * double(theme().scale));
@@ -87,13 +88,15 @@ void show_tooltip(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     std::string text;
     if (hit.port) text = port_tooltip(editor, hit);
     else if (hit.node >= 0) text = node_tooltip(editor, std::size_t(hit.node));
+    else if (hit.map) text = "The whole graph. Click or drag: goes there.";
     else if (hit.comment >= 0) text = "Double click: change the text.";
     else if (hit.group >= 0) text = "Drag: moves its nodes and comments.\nDouble click: change the title.";
     else if (hit.wire >= 0) text = wire_tooltip(editor, wires[std::size_t(hit.wire)]);
     // A tooltip over every node would be in the way: what lies under a resting pointer only.
     static double still_since = 0;
     if (ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0) still_since = ImGui::GetTime();
-    if (ImGui::GetTime() - still_since < 0.4 || text.empty()) return;
+    if (text.empty()) return;
+    if (ImGui::GetTime() - still_since < 0.4) return;
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(ui(340));
     ImGui::TextUnformatted(text.c_str());
@@ -105,6 +108,7 @@ void mark_everything(Editor& editor) {
     if (!editor.marks_wanted) return;
     const Canvas& canvas = editor.canvas;
     const double reach = 4 * theme().scale;
+    if (canvas.map) mark(editor, "map", im(canvas.map->lo), im(canvas.map->lo + canvas.map->size));
     mark(editor, "canvas", im(canvas.lo), im(canvas.lo + canvas.size));
     for (std::size_t i = 0; i < canvas.boxes.size(); ++i) {
         const std::string& id = editor.work.graph().nodes[i].id;
@@ -133,7 +137,8 @@ void fit_canvas(Editor& editor) { editor.canvas.fit_wanted = true; }
 void draw_canvas(Editor& editor) {
     Canvas& canvas = editor.canvas;
     canvas.lo = vec(ImGui::GetCursorScreenPos());
-    canvas.size = vec(ImGui::GetContentRegionAvail());
+    const glm::dvec2 size = vec(ImGui::GetContentRegionAvail());
+    if (std::exchange(canvas.size, size) != size && canvas.fitted) canvas.fit_wanted = true;
     if (canvas.size.x < 1 || canvas.size.y < 1) return;
     update_boxes(editor);
     if (canvas.fit_wanted) do_fit(canvas);
@@ -142,6 +147,8 @@ void draw_canvas(Editor& editor) {
     const bool hovered = ImGui::IsItemHovered() && !editor.start_page;
     std::vector<Wire> wires = wires_of(editor);
     const bool busy = canvas.drag != Canvas::Drag::none;
+    // The map stays where it is while the hand drags in it.
+    if (canvas.drag != Canvas::Drag::map) canvas.map = minimap_of(canvas);
     const Hit hit = hovered || busy ? hit_test(editor, wires, vec(ImGui::GetMousePos())) : Hit();
     if (hovered || busy) {
         handle_mouse(editor, hit, wires, hovered);

@@ -148,26 +148,20 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
 
 // The whole graph, small, with what is seen of it; only where not all of it is seen.
 void draw_minimap(Editor& editor) {
-    Canvas& canvas = editor.canvas;
-    if (canvas.boxes.empty() && canvas.comment_boxes.empty()) return;
-    const auto [lo, hi] = bounds_of(canvas);
-    const glm::dvec2 seen_lo = canvas.pan, seen_hi = canvas.to_canvas(canvas.lo + canvas.size);
-    if (glm::all(glm::lessThanEqual(seen_lo, lo)) && glm::all(glm::greaterThanEqual(seen_hi, hi))) return;
-    const glm::dvec2 all_lo = glm::min(lo, seen_lo), all_hi = glm::max(hi, seen_hi);
-    const glm::dvec2 room(ui(150), ui(100));
-    const glm::dvec2 ratio = room / (all_hi - all_lo);
-    const double k = std::min(ratio.x, ratio.y);
-    const glm::dvec2 size = (all_hi - all_lo) * k;
-    const glm::dvec2 at = canvas.lo + canvas.size - size - glm::dvec2(ui(10));
+    const Canvas& canvas = editor.canvas;
+    if (!canvas.map) return;
+    const Minimap& map = *canvas.map;
     ImDrawList& list = *ImGui::GetWindowDrawList();
-    auto place = [&](glm::dvec2 p) { return im(at + (p - all_lo) * k); };
-    list.AddRectFilled(im(at - glm::dvec2(ui(4))), im(at + size + glm::dvec2(ui(4))), faded(theme().panel, 0.85f), ui(4));
+    auto place = [&](glm::dvec2 p) { return im(map.to_screen(p)); };
+    list.AddRectFilled(im(map.lo - glm::dvec2(ui(4))), im(map.lo + map.size + glm::dvec2(ui(4))), faded(theme().panel, 0.85f), ui(4));
     for (std::size_t i = 0; i < canvas.boxes.size(); ++i) {
         const NodeStatus* status = status_of(editor, editor.work.graph().nodes[i].id);
         list.AddRectFilled(place(canvas.boxes[i].at), place(canvas.boxes[i].at + canvas.boxes[i].size),
                            status ? faded(color_of(status->state), 0.7f) : theme().border, 1);
     }
-    list.AddRect(place(seen_lo), place(seen_hi), theme().accent);
+    // While it is dragged, what is seen may reach beyond it.
+    const glm::dvec2 seen_hi = canvas.to_canvas(canvas.lo + canvas.size);
+    list.AddRect(im(glm::max(map.to_screen(canvas.pan), map.lo)), im(glm::min(map.to_screen(seen_hi), map.lo + map.size)), theme().accent);
 }
 
 }  // namespace
@@ -199,6 +193,17 @@ std::pair<glm::dvec2, glm::dvec2> bounds_of(const Canvas& canvas) {
             hi = glm::max(hi, box.at + box.size);
         }
     return {lo, hi};
+}
+
+std::optional<Minimap> minimap_of(const Canvas& canvas) {
+    if (canvas.boxes.empty() && canvas.comment_boxes.empty()) return std::nullopt;
+    const auto [lo, hi] = bounds_of(canvas);
+    const glm::dvec2 seen_lo = canvas.pan, seen_hi = canvas.to_canvas(canvas.lo + canvas.size);
+    if (glm::all(glm::lessThanEqual(seen_lo, lo)) && glm::all(glm::greaterThanEqual(seen_hi, hi))) return std::nullopt;
+    const glm::dvec2 all_lo = glm::min(lo, seen_lo), all = glm::max(hi, seen_hi) - all_lo;
+    const glm::dvec2 ratio = glm::dvec2(ui(150), ui(100)) / all;
+    const double scale = std::min(ratio.x, ratio.y);
+    return Minimap{canvas.lo + canvas.size - all * scale - glm::dvec2(ui(10)), all * scale, all_lo, scale};
 }
 
 std::vector<Wire> wires_of(const Editor& editor) {

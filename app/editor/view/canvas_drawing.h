@@ -45,6 +45,7 @@ void draw_look(const Pen& pen, Editor& editor, const std::string& node, const No
 
 // Of all nodes, groups and comments, of which there is one at least.
 std::pair<glm::dvec2, glm::dvec2> bounds_of(const Canvas& canvas);
+std::optional<Minimap> minimap_of(const Canvas& canvas);
 NodeBox box_of_comment(const Comment& comment);
 
 void draw_graph(Editor& editor, const std::vector<Wire>& wires, int hovered_wire);

@@ -47,6 +47,8 @@ void hit_ports(const Editor& editor, glm::dvec2 mouse, Hit& hit) {
 
 Hit hit_test(const Editor& editor, const std::vector<Wire>& wires, glm::dvec2 mouse) {
     Hit hit;
+    hit.map = editor.canvas.map && editor.canvas.map->contains(mouse) && editor.canvas.drag == Canvas::Drag::none;
+    if (hit.map) return hit;
     hit_ports(editor, mouse, hit);
     if (hit.port) return hit;
     const glm::dvec2 p = editor.canvas.to_canvas(mouse);
@@ -75,6 +77,7 @@ void zoom_about(Canvas& canvas, glm::dvec2 mouse, double factor) {
     const glm::dvec2 fixed = canvas.to_canvas(mouse);
     canvas.zoom = std::clamp(canvas.zoom * factor, kLeastZoom, kMostZoom);
     canvas.pan += fixed - canvas.to_canvas(mouse);
+    canvas.fitted = false;
 }
 
 }  // namespace
@@ -124,9 +127,22 @@ void drop_wire(Editor& editor, const Hit& hit, glm::dvec2 mouse) {
     });
 }
 
-void drop_nodes(Editor& editor, const std::vector<Wire>& wires, glm::dvec2 mouse) {
+template <class T>
+void choose_alone(Workspace& work, std::set<T>& selected, const T& pressed) {
+    work.selected.clear();
+    work.selected_comments.clear();
+    selected.insert(pressed);
+}
+
+// One of several that was pressed and not moved is then the only one.
+void choose_clicked(Editor& editor, const Hit& hit) {
+    if (hit.node >= 0) choose_alone(editor.work, editor.work.selected, editor.work.graph().nodes[std::size_t(hit.node)].id);
+    else if (hit.comment >= 0) choose_alone(editor.work, editor.work.selected_comments, std::size_t(hit.comment));
+}
+
+void drop_nodes(Editor& editor, const Hit& hit, const std::vector<Wire>& wires, glm::dvec2 mouse) {
     Canvas& canvas = editor.canvas;
-    if (canvas.moved == glm::dvec2(0.0)) return;
+    if (canvas.moved == glm::dvec2(0.0)) return choose_clicked(editor, hit);
     Document::Step step(editor.work.document);
     edit(editor, [&] {
         move_selected(editor.work, canvas.boxes, canvas.moved);
@@ -166,11 +182,7 @@ bool choose(Workspace& work, std::set<T>& selected, const T& pressed) {
         if (!selected.erase(pressed)) selected.insert(pressed);
         return true;
     }
-    if (!selected.count(pressed)) {
-        work.selected.clear();
-        work.selected_comments.clear();
-        selected.insert(pressed);
-    }
+    if (!selected.count(pressed)) choose_alone(work, selected, pressed);
     return false;
 }
 
@@ -205,18 +217,23 @@ void press(Editor& editor, const Hit& hit, const std::vector<Wire>& wires, glm::
     canvas.grabbed = canvas.to_canvas(mouse);
     canvas.moved = glm::dvec2(0.0);
     const ImGuiIO& io = ImGui::GetIO();
-    if (hit.port) {
+    if (hit.map) {
+        canvas.drag = Canvas::Drag::map;
+    } else if (hit.port) {
         canvas.drag = Canvas::Drag::wire;
         canvas.wire = *hit.port;
         canvas.wire_from_output = hit.port_is_output;
         if (!hit.port_is_output && !io.KeyShift) pick_up_wire(editor, *hit.port);
     } else if (hit.node >= 0) {
         const std::string& id = editor.work.graph().nodes[std::size_t(hit.node)].id;
+        canvas.held_at = canvas.boxes[std::size_t(hit.node)].at;
         if (!choose(editor.work, editor.work.selected, id)) canvas.drag = Canvas::Drag::nodes;
     } else if (hit.comment >= 0) {
+        canvas.held_at = canvas.comment_boxes[std::size_t(hit.comment)].at;
         if (!choose(editor.work, editor.work.selected_comments, std::size_t(hit.comment))) canvas.drag = Canvas::Drag::nodes;
     } else if (hit.group >= 0) {
         select_group(editor, std::size_t(hit.group));
+        canvas.held_at = canvas.group_boxes[std::size_t(hit.group)].at;
         canvas.drag = Canvas::Drag::nodes;
     } else if (hit.wire >= 0 && io.KeyAlt) {
         edit(editor, [&] { disconnect(editor.work, wires[std::size_t(hit.wire)].from, wires[std::size_t(hit.wire)].to); });
@@ -244,7 +261,7 @@ void handle_mouse(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     const bool panning = ImGui::IsMouseDown(ImGuiMouseButton_Middle) ||
                          (ImGui::IsMouseDown(ImGuiMouseButton_Right) && ImGui::IsMouseDragging(ImGuiMouseButton_Right, 4));
     if (canvas.drag == Canvas::Drag::none && hovered) {
-        if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left)) {
+        if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) && !hit.map) {
             if (hit.node >= 0) show_in_viewport(editor, hit.node);
             else if (hit.comment >= 0) open_note(editor, NoteEditor::Kind::comment, std::size_t(hit.comment));
             else if (hit.group >= 0) open_note(editor, NoteEditor::Kind::group, std::size_t(hit.group));
@@ -262,11 +279,20 @@ void handle_mouse(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
         case Canvas::Drag::none: return;
         case Canvas::Drag::pan:
             canvas.pan -= vec(io.MouseDelta) / (canvas.zoom * double(theme().scale));
+            canvas.fitted = false;
             if (!panning) canvas.drag = Canvas::Drag::none;
             return;
         case Canvas::Drag::nodes: {
             const glm::dvec2 by = at - canvas.grabbed;
-            if (glm::length(by) * canvas.zoom > 4) canvas.moved = snapped(by);
+            if (glm::length(by) * canvas.zoom > 4 || canvas.moved != glm::dvec2(0.0)) canvas.moved = snapped(canvas.held_at + by) - canvas.held_at;
+            break;
+        }
+        case Canvas::Drag::map: {
+            // No farther than the graph is.
+            const auto [lo, hi] = bounds_of(canvas);
+            const glm::dvec2 middle = glm::clamp(canvas.map->to_canvas(mouse), lo, hi);
+            canvas.pan = middle - canvas.size / (canvas.zoom * double(theme().scale)) * 0.5;
+            canvas.fitted = false;
             break;
         }
         case Canvas::Drag::box:
@@ -275,7 +301,7 @@ void handle_mouse(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     if (ImGui::IsMouseDown(ImGuiMouseButton_Left)) return;
     const Canvas::Drag ended = std::exchange(canvas.drag, Canvas::Drag::none);
     if (ended == Canvas::Drag::wire) drop_wire(editor, hit, mouse);
-    if (ended == Canvas::Drag::nodes) drop_nodes(editor, wires, mouse);
+    if (ended == Canvas::Drag::nodes) drop_nodes(editor, hit, wires, mouse);
     if (ended == Canvas::Drag::box) select_in_box(editor, canvas.grabbed, at);
     canvas.moved = glm::dvec2(0.0);
 }

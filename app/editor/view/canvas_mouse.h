@@ -9,6 +9,7 @@ namespace voxloom::editor {
 struct Hit {
     std::optional<WireEnd> port;
     bool port_is_output = false;
+    bool map = false;  // the small one of the whole graph, and nothing below it
     int node = -1, comment = -1, group = -1, wire = -1;  // by index; of a group its title
 };
 Hit hit_test(const Editor& editor, const std::vector<Wire>& wires, glm::dvec2 mouse);

@@ -165,7 +165,7 @@ void draw_against(Editor& editor) {
     Viewport& view = editor.viewport;
     const bool chosen = view.against == Against::port && editor.work.graph().find(view.reference.node);
     const std::string now = view.against == Against::uncompressed ? "uncompressed" : chosen ? view.reference.node : "first picture";
-    if (ImGui::SmallButton(shortened("Against " + now, ui(150), theme().body, theme().body->FontSize).c_str())) ImGui::OpenPopup("against");
+    if (ImGui::Button(shortened("Against " + now, ui(150), theme().body, theme().body->FontSize).c_str())) ImGui::OpenPopup("against");
     mark(editor, "against");
     tooltip("What image errors are measured against.");
     if (!ImGui::BeginPopup("against")) return;
@@ -176,11 +176,8 @@ void draw_against(Editor& editor) {
     choice("first picture", view.against == Against::first, Against::first, {});
     choice("uncompressed", view.against == Against::uncompressed, Against::uncompressed, {});
     tooltip("Of each picture the one without its codec: the same nodes draw the volume itself.");
-    for (const WireEnd& port : ports_to_look_at(editor)) {
-        const GraphNode* node = editor.work.graph().find(port.node);
-        const PortSpec* spec = editor.registry.find(node->type)->find_output(port.port);
-        if (type_of(*spec) == PortType::image) choice(port.node + "." + port.port, chosen && same_end(port, view.reference), Against::port, port);
-    }
+    for (const WireEnd& port : ports_to_look_at(editor))
+        if (makes_image(editor, port)) choice(port.node + "." + port.port, chosen && same_end(port, view.reference), Against::port, port);
     ImGui::EndPopup();
 }
 

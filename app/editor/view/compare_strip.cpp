@@ -102,10 +102,9 @@ void draw_tried(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo, 
     if (clicked) edit(editor, [&] { bring_back(editor.work.document, chosen, editor.registry); });
 }
 
-void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at) {
-    ImGui::SetCursorScreenPos(at);
+void draw_buttons(Editor& editor, const std::vector<Branch>& branches) {
     const Action& numbers = action("numbers");
-    if (ImGui::SmallButton(editor.viewport.numbers ? "Hide numbers" : "Show numbers")) numbers.run(editor);
+    if (ImGui::Button(editor.viewport.numbers ? "Hide numbers" : "Show numbers")) numbers.run(editor);
     mark(editor, "numbers");
     tooltip(fmt::format("{}  ({})", numbers.doc, key_text(numbers)));
     ImGui::SameLine();
@@ -115,7 +114,7 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at
     }
     if (editor.sweep) {
         const std::string text = fmt::format("Stop, {} of {}", std::min(editor.sweep->next, editor.sweep->values.size()), editor.sweep->values.size());
-        if (ImGui::SmallButton(text.c_str())) editor.sweep.reset();
+        if (ImGui::Button(text.c_str())) editor.sweep.reset();
         mark(editor, "sweep-stop");
         return;
     }
@@ -124,7 +123,7 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches, ImVec2 at
         if (branch.codec.empty() || !codecs.insert(branch.codec).second) continue;
         const std::optional<Sweep> sweep = sweep_of(editor.work.graph(), editor.registry, branch.codec);
         ImGui::BeginDisabled(!sweep);
-        if (ImGui::SmallButton(("Sweep " + branch.codec).c_str())) editor.sweep = sweep;
+        if (ImGui::Button(("Sweep " + branch.codec).c_str())) editor.sweep = sweep;
         ImGui::EndDisabled();
         mark(editor, "sweep:" + branch.codec);
         tooltip(sweep ? fmt::format("Tries {} values of {}; the graph stays as it is.", sweep->values.size(), sweep->param)
@@ -145,7 +144,10 @@ double compare_strip_height(const Editor& editor, double room) {
 void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size) {
     const std::vector<Branch>& branches = editor.branches;
     ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().panel);
-    draw_buttons(editor, branches, im(lo + glm::dvec2(ui(8), ui(3))));
+    ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(2))));
+    ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(ui(7), ui(2)));
+    draw_buttons(editor, branches);
+    ImGui::PopStyleVar();
     if (size.y < double(ui(kButtons + kLine))) return;
     const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(kButtons));
     draw_numbers(editor, im(table));

@@ -250,7 +250,7 @@ void draw_recovery_question(Editor& editor) {
     if (ImGui::Button("Discard")) answered();
     mark(editor, "recovery:discard");
     ImGui::SameLine();
-    if (ImGui::Button("Ask again next time")) {
+    if (ImGui::Button("Ask again next time") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape), false)) {
         editor.recovered.clear();
         ImGui::CloseCurrentPopup();
     }
@@ -315,6 +315,8 @@ void draw_help(Editor& editor) {
         {"Drag from a port", "Draws a wire. Dropped in empty space it offers what fits."},
         {"Drag from a wired input", "Takes the wire off; with Shift, begins another one."},
         {"Wheel; right or middle button", "Zooms to the pointer; moves the canvas."},
+        {"Drag in empty space", "Selects what the box touches; with Shift, adds it."},
+        {"The map in the corner", "Goes to what is clicked; follows the hand."},
         {"Double click, right click", "Adds a node; on a node, shows its picture."},
         {"Drag the picture", "Turns its camera; with Shift or the middle button, moves it."},
         {"Wheel on the picture", "Zooms the camera; with Ctrl, magnifies the picture."},

@@ -148,17 +148,25 @@ std::vector<WireEnd> ports_to_look_at(const Editor& editor) {
     return ports;
 }
 
+std::size_t most_shown(Viewport::Mode mode) { return mode == Viewport::Mode::single ? 1 : mode == Viewport::Mode::four ? 4 : 2; }
+
+bool makes_image(const Editor& editor, const WireEnd& port) {
+    const GraphNode* node = editor.work.graph().find(port.node);
+    const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
+    const PortSpec* spec = type ? type->find_output(port.port) : nullptr;
+    return spec && type_of(*spec) == PortType::image;
+}
+
 std::vector<WireEnd> shown_ports(const Editor& editor) {
     const std::vector<WireEnd> all = ports_to_look_at(editor);
-    const Viewport::Mode mode = editor.viewport.mode;
-    const std::size_t count = mode == Viewport::Mode::single ? 1 : mode == Viewport::Mode::four ? 4 : 2;
+    const std::size_t count = most_shown(editor.viewport.mode);
     std::vector<WireEnd> shown;
     for (std::size_t k = 0; k < count; ++k) {
         if (const WireEnd& chosen = editor.viewport.pictures[k].port; contains(all, chosen)) {
             shown.push_back(chosen);
             continue;
         }
-        auto next = std::find_if(all.begin(), all.end(), [&](const WireEnd& end) { return !contains(shown, end); });
+        auto next = std::ranges::find_if(all, [&](const WireEnd& end) { return !contains(shown, end) && (shown.empty() || makes_image(editor, end)); });
         if (next != all.end()) shown.push_back(*next);
     }
     return shown;
@@ -262,6 +270,7 @@ namespace {
 constexpr ImGuiWindowFlags kRegion = ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove |
                                      ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoSavedSettings |
                                      ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoNavInputs;
+constexpr ImGuiWindowFlags kCanvas = ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoBackground;
 
 void region(const char* name, ImVec2 lo, ImVec2 hi, ImGuiWindowFlags flags, ImVec2 padding, const std::function<void()>& f) {
     ImGui::SetNextWindowPos(lo);
@@ -330,16 +339,19 @@ void draw(Editor& editor) {
 
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const float top = ui(44), bottom = size.y - ui(28), gap = ui(5);
-    const float x = std::round(size.x * editor.split_x), y = std::round(top + (bottom - top) * editor.split_y);
     region("toolbar", {0, 0}, {size.x, top}, ImGuiWindowFlags_NoScrollbar, {ui(10), ui(8)}, [&] { draw_toolbar(editor); });
-    region("graph", {0, top}, {x, bottom}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoBackground, {0, 0},
-           [&] { draw_canvas(editor); });
-    region("picture", {x + gap, top}, {size.x, y}, ImGuiWindowFlags_NoScrollbar | ImGuiWindowFlags_NoScrollWithMouse | ImGuiWindowFlags_NoBackground, {0, 0},
-           [&] { draw_viewport(editor); });
-    region("parameters", {x + gap, y + gap}, {size.x, bottom}, 0, {ui(14), ui(10)}, [&] { draw_parameters(editor); });
+    const bool large = editor.large_picture && !editor.start_page;
+    Split& split = editor.viewport.mode == Viewport::Mode::single ? editor.split_single : editor.split_compared;
+    float& share = large ? editor.split_large : split.x;
+    const float x = std::round(size.x * share), y = std::round(top + (bottom - top) * split.y);
+    const ImVec2 picture_lo{large ? 0 : x + gap, top}, picture_hi{large ? x : size.x, large ? bottom : y};
+    if (!large)
+        region("graph", {0, top}, {x, bottom}, kCanvas, {0, 0}, [&] { draw_canvas(editor); });
+    region("picture", picture_lo, picture_hi, kCanvas, {0, 0}, [&] { draw_viewport(editor); });
+    region("parameters", {x + gap, large ? top : y + gap}, {size.x, bottom}, 0, {ui(14), ui(10)}, [&] { draw_parameters(editor); });
     region("status", {0, bottom}, {size.x, size.y}, ImGuiWindowFlags_NoScrollbar, {ui(12), ui(5)}, [&] { draw_status_bar(editor); });
-    splitter(editor, "split:x", true, {x, top}, {x + gap, bottom}, 0, size.x, editor.split_x);
-    splitter(editor, "split:y", false, {x + gap, y}, {size.x, y + gap}, top, bottom - top, editor.split_y);
+    splitter(editor, "split:x", true, {x, top}, {x + gap, bottom}, 0, size.x, share);
+    if (!large) splitter(editor, "split:y", false, {x + gap, y}, {size.x, y + gap}, top, bottom - top, split.y);
     if (editor.start_page) draw_start_page(editor);
     draw_add_menu(editor);
     draw_note_editor(editor);

@@ -18,6 +18,7 @@
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
 #include "app/editor/model/histogram.h"
+#include "app/editor/model/knobs.h"
 #include "app/editor/model/pick.h"
 #include "app/editor/model/settings.h"
 #include "app/editor/model/thumbnail.h"
@@ -25,15 +26,28 @@
 
 namespace voxloom::editor {
 
+// The whole graph, small, in the canvas' corner.
+struct Minimap {
+    glm::dvec2 lo{0.0}, size{0.0};  // on the screen
+    glm::dvec2 all_lo{0.0};         // canvas coordinates of its upper left corner
+    double scale = 1;               // pixels of the screen a canvas unit
+
+    bool contains(glm::dvec2 p) const { return glm::all(glm::greaterThanEqual(p, lo)) && glm::all(glm::lessThan(p, lo + size)); }
+    glm::dvec2 to_screen(glm::dvec2 p) const { return lo + (p - all_lo) * scale; }
+    glm::dvec2 to_canvas(glm::dvec2 p) const { return all_lo + (p - lo) / scale; }
+};
+
 // The part of the canvas that is seen, and what the mouse is doing there.
 struct Canvas {
-    enum class Drag { none, pan, nodes, box, wire };
+    enum class Drag { none, pan, nodes, box, wire, map };
     glm::dvec2 pan{0.0};  // canvas coordinates of the upper left corner
     double zoom = 1;      // pixels (before scaling) a canvas unit
     bool fit_wanted = true;
+    bool fitted = false;  // the whole graph is shown, and stays so when the window changes
     glm::dvec2 lo{0.0}, size{0.0};  // on the screen, of the last frame
     Drag drag = Drag::none;
     glm::dvec2 grabbed{0.0};  // canvas coordinates where the drag began
+    glm::dvec2 held_at{0.0};  // place of what was grabbed there
     glm::dvec2 moved{0.0};    // by which the selected nodes are shown away from their places
     WireEnd wire;             // the port that a wire is drawn from
     bool wire_from_output = true;
@@ -43,6 +57,7 @@ struct Canvas {
     std::vector<Group> groups;
     std::vector<Comment> comments;
     std::vector<NodeBox> boxes, group_boxes, comment_boxes;
+    std::optional<Minimap> map;  // where not all of the graph is seen
 
     glm::dvec2 to_screen(glm::dvec2 p) const { return lo + (p - pan) * zoom * double(theme().scale); }
     glm::dvec2 to_canvas(glm::dvec2 p) const { return pan + (p - lo) / (zoom * double(theme().scale)); }
@@ -95,6 +110,11 @@ struct Viewport {
     glm::dvec2 offset{0.0};    // of the picture's middle from the viewport's, in screen pixels
 };
 
+// How the window is shared out: the graph to the left, pictures above parameters. What is compared gets more.
+struct Split {
+    float x = 0.6f, y = 0.5f;
+};
+
 struct FileDialog {
     enum class Purpose { open_graph, save_graph, parameter };
     Purpose purpose = Purpose::open_graph;
@@ -112,6 +132,15 @@ struct TransferEditor {
     bool gradients = false;                           // shown behind the function
     Picture picture{};                                // of them
     std::shared_ptr<const GradientHistogram> shown{};  // in the picture
+};
+
+// What the list of knobs was made of, and the list.
+struct KnobList {
+    std::string text;                   // of the document
+    std::vector<std::string> selected;
+    std::vector<WireEnd> shown;
+    bool all = false;
+    std::vector<Knob> knobs;
 };
 
 // The title or the comment that is typed.
@@ -154,8 +183,11 @@ struct Editor {
     bool ask_about_changes = false;
     std::string id_text, id_of;               // the node's name while it is typed
     std::map<std::string, std::string> texts;  // of parameters while they are typed
+    KnobList knobs;
     std::string copied;
-    float split_x = 0.6f, split_y = 0.5f;      // of the window: canvas | rest; picture above parameters
+    Split split_single{}, split_compared{0.45f, 0.62f};
+    float split_large = 0.74f;
+    bool large_picture = false;                // takes the graph's place, with the parameters beside it
     bool quit = false;
     bool theme_changed = false, screenshot_wanted = false, picture_wanted = false;
 
@@ -210,8 +242,12 @@ void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi);
 const NodeStatus* status_of(const Editor& editor, const std::string& node);
 // Images and tables, those that the graph is run for first.
 std::vector<WireEnd> ports_to_look_at(const Editor& editor);
-// What the viewport shows; fewer where there are not as many.
+// What the viewport shows; fewer where there are not as many. Tables only where they were chosen, or alone where
+// there is no image.
 std::vector<WireEnd> shown_ports(const Editor& editor);
+// How many pictures fit the mode.
+std::size_t most_shown(Viewport::Mode mode);
+bool makes_image(const Editor& editor, const WireEnd& port);
 // The size of a port's image when nothing moves.
 glm::ivec2 whole_size(const Editor& editor, const WireEnd& port, glm::ivec2 otherwise);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "app/editor/model/knobs.h"
 #include "app/editor/model/param_values.h"
 #include "app/editor/view/actions.h"
 #include "app/editor/view/editor.h"
@@ -370,6 +371,43 @@ void draw_outputs(Editor& editor, const std::string& id, const NodeType& type) {
     }
 }
 
+// What trades speed for error, in the nodes that are selected, or else in those that make what is looked at.
+void update_knobs(Editor& editor) {
+    KnobList& list = editor.knobs;
+    const Graph& graph = editor.work.graph();
+    const std::vector<std::string> selected(editor.work.selected.begin(), editor.work.selected.end());
+    const std::vector<WireEnd> shown = selected.empty() ? shown_ports(editor) : std::vector<WireEnd>();
+    auto same = [](const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; };
+    if (list.text == editor.work.document.text() && list.selected == selected && list.all == editor.show_expert &&
+        std::ranges::equal(list.shown, shown, same)) return;
+    list.text = editor.work.document.text(), list.selected = selected, list.shown = shown, list.all = editor.show_expert;
+    list.knobs = knobs_of(graph, editor.registry, selected.empty() ? nodes_of(graph, shown) : selected, editor.show_expert);
+}
+
+void draw_knobs(Editor& editor) {
+    constexpr std::size_t kMost = 40;
+    update_knobs(editor);
+    const std::vector<Knob> knobs = editor.knobs.knobs;  // an edit of one makes the list anew
+    if (knobs.empty()) return;
+    ImGui::Dummy({0, ui(2)});
+    text_in(theme().accent, "Speed against error");
+    tooltip("The parameters that trade one for the other, of the selected nodes, or of all that make what is shown.");
+    ImGui::Separator();
+    for (std::size_t i = 0; i < std::min(knobs.size(), kMost); ++i) {
+        const std::string& id = knobs[i].node;
+        ImGui::PushID(id.c_str());
+        if (i == 0 || knobs[i - 1].node != id) {
+            text_in(theme().text, id.c_str());
+            if (ImGui::IsItemClicked()) editor.work.selected = {id};
+            mark(editor, "knobs:" + id);
+            tooltip("Click: selects the node, to see all its parameters.");
+        }
+        draw_row(editor, id, *knobs[i].spec);
+        ImGui::PopID();
+    }
+    if (knobs.size() > kMost) wrapped_in(theme().muted, fmt::format("And {} more; select the nodes that are of interest.", knobs.size() - kMost));
+}
+
 }  // namespace
 
 void draw_parameters(Editor& editor) {
@@ -379,7 +417,7 @@ void draw_parameters(Editor& editor) {
         wrapped_in(theme().muted, n == 0 ? "Select a node to see its parameters." : fmt::format("{} nodes are selected.", n));
         if (n == 0) draw_action_row(editor, {"comment"});
         else draw_action_row(editor, {"bypass", "disable", "group", "ungroup", "align", "duplicate", "delete"});
-        return;
+        return draw_knobs(editor);
     }
     const std::string id = node->id;
     const NodeType* type = editor.registry.find(node->type);

@@ -32,8 +32,8 @@ const Camera* camera_seen(const Editor& editor, const std::optional<std::string>
 
 // --- what stands above the pictures ---------------------------------------------------------------
 
-void draw_port_choice(Editor& editor, std::size_t k, const WireEnd& shown, float width) {
-    const std::string name = name_of_port(shown);
+void draw_port_choice(Editor& editor, std::size_t k, const WireEnd* shown, float width) {
+    const std::string name = shown ? name_of_port(*shown) : "Choose…";
     ImGui::PushID(int(k));
     ImGui::SetNextItemWidth(width);
     const std::string seen = shortened(name, width - ImGui::GetFrameHeight() - ui(12), theme().body, theme().body->FontSize);
@@ -228,6 +228,7 @@ struct Cell {
 
 void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& ports) {
     Viewport& view = editor.viewport;
+    if (cell.shown.front() >= ports.size()) return say_in(cell.lo, cell.size, "Any picture or table of the graph can be shown here.");
     const WireEnd& port = ports[cell.shown.front()];
     const LiveValue* value = value_at(editor, port);
     if (cell.shown.size() == 1 && value && std::holds_alternative<TablePtr>(value->value))
@@ -284,29 +285,47 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     list.PopClipRect();
 }
 
-std::vector<Cell> cells_of(const Viewport& view, glm::dvec2 lo, glm::dvec2 size, std::size_t ports) {
+// Beside and below each other, so that pictures of this size are shown as large as can be.
+std::vector<Cell> grid_of(glm::dvec2 lo, glm::dvec2 size, std::size_t count, glm::dvec2 picture) {
     const double gap = ui(3);
-    auto cell = [&](std::size_t k, std::size_t columns, std::size_t rows) {
-        const glm::dvec2 each = (size - gap * glm::dvec2(double(columns - 1), double(rows - 1))) / glm::dvec2(double(columns), double(rows));
-        return Cell{lo + (each + gap) * glm::dvec2(double(k % columns), double(k / columns)), each, {k}};
+    auto each_of = [&](std::size_t columns) {
+        const glm::dvec2 n(double(columns), double((count + columns - 1) / columns));
+        return glm::max((size - gap * (n - 1.0)) / n, glm::dvec2(1));
     };
+    auto scale_of = [&](std::size_t columns) {
+        const glm::dvec2 ratio = each_of(columns) / picture;
+        return std::min(ratio.x, ratio.y);
+    };
+    std::size_t columns = count;
+    for (std::size_t fewer = count; fewer-- > 1;)
+        if (scale_of(fewer) > scale_of(columns)) columns = fewer;
     std::vector<Cell> cells;
-    switch (view.mode) {
-        case Mode::single: cells.push_back(cell(0, 1, 1)); break;
-        case Mode::two:
-            for (std::size_t k = 0; k < std::min<std::size_t>(ports, 2); ++k) cells.push_back(cell(k, 2, 1));
-            break;
-        case Mode::four:
-            for (std::size_t k = 0; k < std::min<std::size_t>(ports, 4); ++k) cells.push_back(cell(k, 2, 2));
-            break;
-        case Mode::wipe:
-        case Mode::flicker:
-        case Mode::difference:
-            cells.push_back(cell(0, 1, 1));
-            if (ports > 1) cells[0].shown.push_back(1);
-            break;
-    }
+    for (std::size_t k = 0; k < count; ++k)
+        cells.push_back({lo + (each_of(columns) + gap) * glm::dvec2(double(k % columns), double(k / columns)), each_of(columns), {k}});
     return cells;
+}
+
+bool beside_each_other(Mode mode) { return mode == Mode::two || mode == Mode::four; }
+
+std::vector<Cell> cells_of(const Editor& editor, glm::dvec2 lo, glm::dvec2 size, const std::vector<WireEnd>& ports) {
+    const Mode mode = editor.viewport.mode;
+    if (!beside_each_other(mode)) {
+        std::vector<Cell> cells{{lo, size, {0}}};
+        if (mode != Mode::single && ports.size() > 1) cells[0].shown.push_back(1);
+        return cells;
+    }
+    // One more, to choose what is shown in it.
+    const std::size_t count = std::min(ports.size() + 1, most_shown(mode));
+    return grid_of(lo, size, count, glm::max(glm::dvec2(whole_size(editor, ports.front(), glm::ivec2(1))), glm::dvec2(1)));
+}
+
+void draw_port_choices(Editor& editor, const Cell& cell, const std::vector<WireEnd>& ports, double taken) {
+    const float width = std::min(ui(200), float(cell.size.x - taken) / float(cell.shown.size()) - ui(10));
+    ImGui::SetCursorScreenPos(im(cell.lo + glm::dvec2(ui(8), ui(7))));
+    for (std::size_t k : cell.shown) {
+        draw_port_choice(editor, k, k < ports.size() ? &ports[k] : nullptr, std::max(width, ui(80)));
+        ImGui::SameLine();
+    }
 }
 
 }  // namespace
@@ -319,30 +338,23 @@ void draw_viewport(Editor& editor) {
     mark(editor, "picture", im(lo), im(lo + size));
     const std::vector<WireEnd> ports = shown_ports(editor);
     if (ports.empty()) return say_in(lo, size, "A node that makes an image shows it here.");
-    const std::vector<Cell> cells = cells_of(editor.viewport, lo, size, ports.size());
+    // Above pictures that share the width there is a bar; else its buttons stand in the picture, beside the lists.
+    const Mode mode = editor.viewport.mode;
+    const bool beside = beside_each_other(mode);
+    const glm::dvec2 bar(0, beside ? ui(36) : 0);
+    const std::vector<Cell> cells = cells_of(editor, lo + bar, size - bar, ports);
     for (const Cell& cell : cells) {
         ImGui::GetWindowDrawList()->AddRectFilled(im(cell.lo), im(cell.lo + cell.size), IM_COL32(0, 0, 0, 255));
         draw_cell(editor, cell, ports);
         mark(editor, fmt::format("picture:{}", cell.shown.front()), im(cell.lo), im(cell.lo + cell.size));
     }
-    for (const Cell& cell : cells) {
-        const bool first = cell.shown.front() == 0;
-        // Beside the lists stand the mode, its slider, and a button.
-        const Mode mode = editor.viewport.mode;
-        const bool narrow = mode == Mode::two || mode == Mode::four;
-        const double taken = !first ? ui(8) : narrow ? ui(120) : mode == Mode::difference ? ui(310) : ui(210);
-        const float width = std::min(ui(200), float(cell.size.x - taken) / float(cell.shown.size()) - ui(10));
-        ImGui::SetCursorScreenPos(im(cell.lo + glm::dvec2(ui(8), ui(7))));
-        for (std::size_t k : cell.shown) {
-            draw_port_choice(editor, k, ports[k], std::max(width, ui(80)));
-            ImGui::SameLine();
-        }
-        if (!first) continue;
-        draw_mode_choice(editor);
-        if (narrow) continue;
-        ImGui::SameLine();
-        action_button(editor, "fit-picture");
-    }
+    for (const Cell& cell : cells) draw_port_choices(editor, cell, ports, beside ? ui(8) : mode == Mode::difference ? ui(370) : ui(270));
+    if (beside) ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(5))));
+    draw_mode_choice(editor);
+    ImGui::SameLine();
+    action_button(editor, "fit-picture");
+    ImGui::SameLine();
+    action_button(editor, "large");
     if (strip > 0) draw_compare_strip(editor, lo + glm::dvec2(0, size.y), {size.x, strip});
 }
 

@@ -34,6 +34,13 @@ std::string last_glfw_error() {
     return text ? text : "unknown reason";
 }
 
+glm::ivec2 fitting_size() {
+    glm::ivec2 at, room(0);
+    if (GLFWmonitor* monitor = glfwGetPrimaryMonitor()) glfwGetMonitorWorkarea(monitor, &at.x, &at.y, &room.x, &room.y);
+    const glm::ivec2 wanted(1600, 960);
+    return room.x > 0 && room.y > 0 ? glm::min(wanted, room) : wanted;
+}
+
 // The window with everything that must be undone with it, in order.
 class Window {
   public:
@@ -42,7 +49,8 @@ class Window {
         glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
         glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
         glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-        window_ = glfwCreateWindow(arguments.size.x, arguments.size.y, "voxloom", nullptr, nullptr);
+        const glm::ivec2 size = arguments.size.x > 0 ? arguments.size : fitting_size();
+        window_ = glfwCreateWindow(size.x, size.y, "voxloom", nullptr, nullptr);
         if (!window_) {
             const std::string reason = last_glfw_error();
             glfwTerminate();

@@ -12,7 +12,7 @@ namespace voxloom::editor {
 struct EditArguments {
     std::filesystem::path graph;              // empty: the start page
     std::filesystem::path out = "out";        // where screenshots and written files go
-    glm::ivec2 size{1600, 960};               // of the window, in its screen's coordinates
+    glm::ivec2 size{0};                       // of the window, in its screen's coordinates; 0: as it fits there
     double scale = 0;                         // pixels a unit; 0: the screen's own
     std::stop_token stop;                     // of the program: what is not saved is found by the next session
     std::filesystem::path screen;             // where to write what is on the screen; empty: nowhere
