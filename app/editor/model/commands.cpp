@@ -10,8 +10,6 @@ namespace voxloom::editor {
 
 namespace {
 
-bool same(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
-
 const GraphInput* find_input(const Graph& graph, const WireEnd& to) {
     const GraphNode* node = graph.find(to.node);
     if (!node) return nullptr;
@@ -50,7 +48,7 @@ void connect(Workspace& workspace, const Registry& registry, const WireEnd& from
     if (std::string reason = why_not_wired(workspace.graph(), registry, from, to); !reason.empty())
         throw Error(reason);
     const GraphInput* input = find_input(workspace.graph(), to);
-    if (input && std::any_of(input->from.begin(), input->from.end(), [&](const WireEnd& end) { return same(end, from); }))
+    if (input && std::any_of(input->from.begin(), input->from.end(), [&](const WireEnd& end) { return same_end(end, from); }))
         return;
     workspace.document.connect(from.node, from.port, to.node, to.port,
                                takes_many(workspace.graph(), registry, to));
@@ -60,7 +58,7 @@ void disconnect(Workspace& workspace, const WireEnd& from, const WireEnd& to) {
     const GraphInput* input = find_input(workspace.graph(), to);
     if (!input) return;
     std::vector<WireEnd> kept = input->from;
-    std::erase_if(kept, [&](const WireEnd& end) { return same(end, from); });
+    std::erase_if(kept, [&](const WireEnd& end) { return same_end(end, from); });
     Document::Step step(workspace.document);
     workspace.document.disconnect(to.node, to.port);
     for (const WireEnd& end : kept)
@@ -239,13 +237,13 @@ void paste(Workspace& workspace, const Registry& registry, const std::string& te
 }
 
 bool is_output(const Graph& graph, const WireEnd& port) {
-    return std::any_of(graph.outputs.begin(), graph.outputs.end(), [&](const WireEnd& end) { return same(end, port); });
+    return std::any_of(graph.outputs.begin(), graph.outputs.end(), [&](const WireEnd& end) { return same_end(end, port); });
 }
 
 void set_output(Workspace& workspace, const WireEnd& port, bool on) {
     std::vector<std::pair<std::string, std::string>> outputs;
     for (const WireEnd& end : workspace.graph().outputs)
-        if (!same(end, port)) outputs.emplace_back(end.node, end.port);
+        if (!same_end(end, port)) outputs.emplace_back(end.node, end.port);
     if (on) outputs.emplace_back(port.node, port.port);
     workspace.document.set_outputs(outputs);
 }

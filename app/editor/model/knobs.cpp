@@ -1,6 +1,5 @@
 #include "app/editor/model/knobs.h"
 
-#include <algorithm>
 #include <set>
 #include <string_view>
 
@@ -15,11 +14,8 @@ std::vector<Knob> knobs_of(const Graph& graph, const Registry& registry, const s
     for (const GraphNode& node : graph.nodes) {
         const NodeType* type = wanted.count(node.id) ? registry.find(node.type) : nullptr;
         if (!type || node.use != GraphNode::Use::normal) continue;
-        auto is_set = [&](const ParamSpec& spec) {
-            return std::ranges::any_of(node.params, [&](const GraphParam& param) { return param.key == spec.key; });
-        };
         for (const ParamSpec& spec : type->params)
-            if (spec.quality && is_in_use(node, *type, spec) && (!spec.expert || all || is_set(spec))) knobs.push_back({node.id, &spec});
+            if (spec.quality && is_in_use(node, *type, spec) && (!spec.expert || all || find_param(node, spec.key))) knobs.push_back({node.id, &spec});
     }
     return knobs;
 }

@@ -14,7 +14,7 @@ struct Knob {
     const ParamSpec* spec = nullptr;  // of the node's type
 };
 
-// As far as they are in use, and not for experts alone; in the order of the graph. `all` gives an expert's, too.
+// As far as they are in use; of those for experts such as are set, or `all`. In the order of the graph.
 std::vector<Knob> knobs_of(const Graph& graph, const Registry& registry, const std::vector<std::string>& nodes, bool all = false);
 
 // Those nodes that these ports are made of.

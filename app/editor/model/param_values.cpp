@@ -5,15 +5,18 @@
 
 namespace voxloom::editor {
 
+const GraphParam* find_param(const GraphNode& node, std::string_view key) {
+    const auto found = std::ranges::find(node.params, key, &GraphParam::key);
+    return found == node.params.end() ? nullptr : &*found;
+}
+
 ParamValue value_of(const GraphNode& node, const ParamSpec& spec) {
     std::string reason;
-    for (const GraphParam& param : node.params)
-        if (param.key == spec.key)
-            if (auto value = parse_param(spec, param.yaml, reason)) {
-                problem_with(spec, *value);  // a whole number that stands for a real becomes one
-                return *value;
-            }
-    return spec.initial;
+    const GraphParam* param = find_param(node, spec.key);
+    std::optional<ParamValue> value = param ? parse_param(spec, param->yaml, reason) : std::nullopt;
+    if (!value) return spec.initial;
+    problem_with(spec, *value);  // a whole number that stands for a real becomes one
+    return *value;
 }
 
 bool is_in_use(const GraphNode& node, const NodeType& type, const ParamSpec& spec) {

@@ -1,10 +1,15 @@
 // Parameters as the interface reads and writes them.
 #pragma once
 
+#include <string_view>
+
 #include "core/graph/document.h"
 #include "core/graph/node.h"
 
 namespace voxloom::editor {
+
+// As the document has it; null where it has not.
+const GraphParam* find_param(const GraphNode& node, std::string_view key);
 
 // The value of a parameter as the document has it, or its default.
 ParamValue value_of(const GraphNode& node, const ParamSpec& spec);

@@ -18,6 +18,9 @@ struct NodePorts {
     int output(std::string_view key) const;
 };
 
+// Wherever in the text they stand.
+inline bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
+
 // By index of graph.nodes.
 std::vector<NodePorts> ports_of(const Graph& graph, const Registry& registry);
 PortType type_of(const PortSpec& output);

@@ -17,8 +17,6 @@ using Against = Viewport::Against;
 
 constexpr double kNames = 92, kColumn = 84, kWideColumn = 118;
 
-bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
-
 // The image, as long as it is whole and of the graph as it is.
 ImagePtr fresh_image(const Editor& editor, const WireEnd& port) {
     auto found = editor.live.values.find(port.node + "." + port.port);

@@ -124,8 +124,6 @@ void unless_changed(Editor& editor, std::function<void()> f) {
 
 namespace {
 
-bool same_end(const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; }
-
 bool contains(const std::vector<WireEnd>& ports, const WireEnd& port) {
     return std::any_of(ports.begin(), ports.end(), [&](const WireEnd& p) { return same_end(p, port); });
 }
@@ -150,11 +148,26 @@ std::vector<WireEnd> ports_to_look_at(const Editor& editor) {
 
 std::size_t most_shown(Viewport::Mode mode) { return mode == Viewport::Mode::single ? 1 : mode == Viewport::Mode::four ? 4 : 2; }
 
-bool makes_image(const Editor& editor, const WireEnd& port) {
+namespace {
+
+// Of its node's outputs; -1 where there is no such one.
+struct Output {
+    const NodeType* type = nullptr;
+    std::ptrdiff_t index = -1;
+};
+
+Output output_of(const Editor& editor, const WireEnd& port) {
     const GraphNode* node = editor.work.graph().find(port.node);
     const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
     const PortSpec* spec = type ? type->find_output(port.port) : nullptr;
-    return spec && type_of(*spec) == PortType::image;
+    return {type, spec ? spec - type->outputs.data() : -1};
+}
+
+}  // namespace
+
+bool makes_image(const Editor& editor, const WireEnd& port) {
+    const Output output = output_of(editor, port);
+    return output.index >= 0 && type_of(output.type->outputs[std::size_t(output.index)]) == PortType::image;
 }
 
 std::vector<WireEnd> shown_ports(const Editor& editor) {
@@ -173,14 +186,10 @@ std::vector<WireEnd> shown_ports(const Editor& editor) {
 }
 
 glm::ivec2 whole_size(const Editor& editor, const WireEnd& port, glm::ivec2 otherwise) {
-    const GraphNode* node = editor.work.graph().find(port.node);
-    const NodeType* type = node ? editor.registry.find(node->type) : nullptr;
-    const PortSpec* spec = type ? type->find_output(port.port) : nullptr;
     const NodeStatus* status = status_of(editor, port.node);
-    if (!spec || !status) return otherwise;
-    const auto o = std::size_t(spec - type->outputs.data());
-    if (o >= status->outputs.size()) return otherwise;
-    const auto* image = std::get_if<ImageDesc>(&status->outputs[o].detail);
+    const std::ptrdiff_t index = output_of(editor, port).index;
+    if (index < 0 || !status || std::size_t(index) >= status->outputs.size()) return otherwise;
+    const auto* image = std::get_if<ImageDesc>(&status->outputs[std::size_t(index)].detail);
     return image && image->size.x > 0 && image->size.y > 0 ? image->size : otherwise;
 }
 

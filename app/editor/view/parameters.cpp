@@ -26,12 +26,6 @@ struct Shown {
     std::string problem;
 };
 
-const GraphParam* find_param(const GraphNode& node, std::string_view key) {
-    for (const GraphParam& param : node.params)
-        if (param.key == key) return &param;
-    return nullptr;
-}
-
 Shown shown_value(const GraphNode& node, const ParamSpec& spec) {
     const GraphParam* param = find_param(node, spec.key);
     if (!param) return {spec.initial, false, {}};
@@ -377,9 +371,8 @@ void update_knobs(Editor& editor) {
     const Graph& graph = editor.work.graph();
     const std::vector<std::string> selected(editor.work.selected.begin(), editor.work.selected.end());
     const std::vector<WireEnd> shown = selected.empty() ? shown_ports(editor) : std::vector<WireEnd>();
-    auto same = [](const WireEnd& a, const WireEnd& b) { return a.node == b.node && a.port == b.port; };
     if (list.text == editor.work.document.text() && list.selected == selected && list.all == editor.show_expert &&
-        std::ranges::equal(list.shown, shown, same)) return;
+        std::ranges::equal(list.shown, shown, same_end)) return;
     list.text = editor.work.document.text(), list.selected = selected, list.shown = shown, list.all = editor.show_expert;
     list.knobs = knobs_of(graph, editor.registry, selected.empty() ? nodes_of(graph, shown) : selected, editor.show_expert);
 }
@@ -387,7 +380,7 @@ void update_knobs(Editor& editor) {
 void draw_knobs(Editor& editor) {
     constexpr std::size_t kMost = 40;
     update_knobs(editor);
-    const std::vector<Knob> knobs = editor.knobs.knobs;  // an edit of one makes the list anew
+    const std::vector<Knob>& knobs = editor.knobs.knobs;
     if (knobs.empty()) return;
     ImGui::Dummy({0, ui(2)});
     text_in(theme().accent, "Speed against error");
