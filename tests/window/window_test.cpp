@@ -542,6 +542,50 @@ nodes:
     editor.wait_for("undo of both at once", [&](const json& now) { return now["text"] == text; });
 }
 
+TEST_F(Window, theMapGoesWhereItIsClicked) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    const json whole = editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    EXPECT_FALSE(whole["items"].contains("map")) << "all is seen";
+    editor.move_to("node:head");
+    for (int i = 0; i < 12; ++i) editor.press(4), editor.release(4);  // the wheel
+    editor.wait_for("a near view", [](const json& now) { return now["items"].contains("map") && now["items"]["node:file"][0] > 1280; });
+    auto shows = [](const json& now, const char* node) { return now["items"][node][0] < 768 && now["items"][node][2] > 0; };
+    editor.click("map", 0.9, 0.4);
+    editor.wait_for("the other end", [&](const json& now) { return shows(now, "node:file") && !shows(now, "node:head"); });
+    editor.move_to("map", 0.9, 0.4);
+    editor.press();
+    editor.move_by(-60, 0);
+    editor.move_by(-60, 0);
+    const json back = editor.wait_for("the first end", [&](const json& now) { return shows(now, "node:head") && !shows(now, "node:file"); });
+    editor.release();
+    EXPECT_EQ(back["selected"], json::array());
+    EXPECT_EQ(back["text"], kGraph);
+}
+
+TEST_F(Window, oneOfSeveralIsChosenByAClickAndKnobsAreThereWithoutAChoice) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    editor.with("param:view.slice_distance");
+    editor.click("node:camera");
+    editor.press_with("shift", "node:tf");
+    editor.wait_for("two", [](const json& now) { return now["selected"] == json::array({"camera", "tf"}); });
+    editor.click("node:tf");
+    editor.wait_for("one", [](const json& now) { return now["selected"] == json::array({"tf"}); });
+    editor.click("canvas", 0.02, 0.02);
+    editor.wait_for("none", [](const json& now) { return now["selected"] == json::array(); });
+    editor.click("knobs:view");
+    editor.wait_for("the node of the knobs", [](const json& now) { return now["selected"] == json::array({"view"}); });
+    editor.key("space", "ctrl");
+    editor.wait_for("a large picture", [](const json& now) {
+        return !now["items"].contains("canvas") && now["items"]["picture:0"][2] > 900 && now["items"].contains("param:view.slice_distance");
+    });
+    keep(editor.screenshot(), "large-picture");
+    editor.key("space", "ctrl");
+    EXPECT_EQ(editor.with("canvas")["text"], kGraph);
+}
+
 // Only what changes is drawn; what comes of many changes is what is drawn at once.
 TEST_F(Window, whatIsDrawnInPartsIsWhatIsDrawnAsAWhole) {
     VirtualDisplay display(1280, 720);
