@@ -55,7 +55,7 @@ VirtualDisplay::VirtualDisplay(int width, int height) {
     int ends[2];
     if (pipe(ends) != 0) fail("no pipe can be made");
     process_ = spawn({"Xvfb", "-displayfd", std::to_string(ends[1]), "-screen", "0", fmt::format("{}x{}x24", width, height),
-                      "-nolisten", "tcp"}, {}, "/dev/null");
+                      "-nolisten", "tcp", "-fbdir", folder_.path().string()}, {}, "/dev/null");
     close(ends[1]);
     // It picks a free number and says it once it is ready.
     char c = 0;
@@ -69,6 +69,21 @@ VirtualDisplay::VirtualDisplay(int width, int height) {
 VirtualDisplay::~VirtualDisplay() {
     ::kill(process_, SIGTERM);
     waitpid(process_, nullptr, 0);
+}
+
+// Xvfb keeps its screen in a file of the X Window Dump format: a header of 32-bit numbers, most significant byte first,
+// a name that fills it up, 12 bytes for each colour of a palette, then lines of pixels.
+std::string VirtualDisplay::screen() const {
+    std::ifstream in(folder_.path() / "Xvfb_screen0", std::ios::binary);
+    const std::string dump{std::istreambuf_iterator<char>(in), {}};
+    auto number = [&](std::size_t i) {
+        std::size_t value = 0;
+        for (std::size_t k = 4 * i; k < 4 * i + 4; ++k) value = value << 8 | static_cast<unsigned char>(dump.at(k));
+        return value;
+    };
+    const std::size_t pixels = number(0) + 12 * number(19), height = number(5), line_bytes = number(12);
+    if (dump.size() < pixels + height * line_bytes) fail("the display has no screen to read");
+    return dump.substr(pixels, height * line_bytes);
 }
 
 // --- the editor ----------------------------------------------------------------------------------
@@ -141,13 +156,15 @@ void EditorProcess::xdotool(const std::string& command) {
         fail("xdotool {} failed", command);
 }
 
-// Keys and buttons shorter than a frame would be lost.
+// Until what was done is shown, or nothing more will be.
 void EditorProcess::pause() {
-    const int before = read().is_object() ? read()["frame"].get<int>() : 0;
+    const nlohmann::json first = read();
+    const int before = first.is_object() ? first["frame"].get<int>() : 0;
     for (int i = 0; i < 40; ++i) {
         sleep_ms(25);
         const nlohmann::json now = read();
-        if (i >= 2 && now.is_object() && now["frame"].get<int>() >= before + 2) return;
+        if (!now.is_object() || i < 2) continue;
+        if (now["frame"].get<int>() >= before + 2 || (i >= 8 && now["resting"].get<bool>())) return;
     }
 }
 
@@ -203,6 +220,13 @@ void EditorProcess::key(const std::string& key, const std::string& modifier) {
     pause();
     xdotool("keyup " + key);
     if (!modifier.empty()) xdotool("keyup " + modifier);
+    pause();
+}
+
+void EditorProcess::keys_at_once(const std::string& keys) {
+    ::kill(process_, SIGSTOP);
+    xdotool("key --delay 50 " + keys);  // faster ones are taken for one key that repeats
+    ::kill(process_, SIGCONT);
     pause();
 }
 

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/volumes.h"
+
 namespace voxloom::testing {
 
 // Empty when Xvfb and xdotool are there, else what is missing.
@@ -21,8 +23,11 @@ class VirtualDisplay {
     VirtualDisplay(const VirtualDisplay&) = delete;
     VirtualDisplay& operator=(const VirtualDisplay&) = delete;
     const std::string& name() const { return name_; }  // ":7"
+    // What somebody would see now, four bytes a pixel, with the pointer's picture.
+    std::string screen() const;
 
   private:
+    TempFolder folder_;
     pid_t process_ = 0;
     std::string name_;
 };
@@ -50,6 +55,7 @@ class EditorProcess {
     void press_with(const std::string& modifier, const std::string& item);  // a click while a key is held
     void drag(const std::string& from, const std::string& to);
     void key(const std::string& key, const std::string& modifier = "");
+    void keys_at_once(const std::string& keys);  // "Tab p h", pressed while the editor is stopped: it sees them all together
     void type(const std::string& text);
     std::filesystem::path screenshot();         // F12
     void kill();                                // at once, as a crash would

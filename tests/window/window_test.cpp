@@ -586,37 +586,91 @@ TEST_F(Window, oneOfSeveralIsChosenByAClickAndKnobsAreThereWithoutAChoice) {
     EXPECT_EQ(editor.with("canvas")["text"], kGraph);
 }
 
-// Only what changes is drawn; what comes of many changes is what is drawn at once.
-TEST_F(Window, whatIsDrawnInPartsIsWhatIsDrawnAsAWhole) {
+TEST_F(Window, keysThatAreFasterThanFramesAreNotLost) {
     VirtualDisplay display(1280, 720);
     EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
     editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
-    editor.click("node:camera");
-    editor.drag("param:camera.azimuth", "param:camera.elevation");
-    editor.key("c");
-    editor.key("F1");
-    editor.with("help");
-    editor.key("F1");
-    editor.key("Tab");
-    editor.with("add-query");
-    editor.type("ph");
-    editor.key("Escape");
-    editor.drag("node:tf", "node:file");
-    editor.move_to("action:undo");
-    editor.move_to("canvas", 0.02, 0.98);
-    auto at_rest = [&] {
+    auto often = [](const std::string& key, int times) {
+        std::string keys;
+        for (int i = 0; i < times; ++i) keys += key + " ";
+        return keys;
+    };
+    editor.click("node:tf");
+    editor.keys_at_once(often("d", 15));  // off, on, off, …
+    editor.wait_for("a disabled node", [](const json& now) { return now["resting"].get<bool>() && now["text"] != kGraph; });
+    editor.keys_at_once(often("ctrl+z", 14));
+    editor.wait_for("the first of the changes", [](const json& now) { return now["resting"].get<bool>() && now["text"] != kGraph; });
+    editor.keys_at_once("ctrl+z");
+    editor.wait_for("no change", [](const json& now) { return now["text"] == kGraph; });
+    // What is typed waits for the field that its first key opens.
+    editor.keys_at_once("Tab p h a n t o m Return");
+    const json s = editor.with("node:phantom");
+    EXPECT_TRUE(s["items"].contains("node:tf")) << "letters are no keys while a text is typed";
+    editor.keys_at_once("F11 F12");
+    auto written = [&](const std::string& begin) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder.path() / "e/out", none))
+            if (entry.path().filename().string().starts_with(begin)) return true;
+        return false;
+    };
+    editor.wait_for("both pictures", [&](const json&) { return written("picture-") && written("screenshot-"); });
+}
+
+TEST_F(Window, aPointerThatRestsIsToldWhatItRestsOn) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.idle();
+    editor.move_to("node:tf");
+    editor.with("tooltip");
+    keep(editor.screenshot(), "tooltip");
+    editor.move_to("canvas", 0.02, 0.02);
+    editor.wait_for("no tooltip", [](const json& s) { return !s["items"].contains("tooltip"); });
+}
+
+// Only what changes is drawn and brought to the screen; what many changes leave there is what one drawing of everything does.
+TEST_F(Window, theScreenThatIsDrawnInPartsIsTheOneThatIsDrawnAsAWhole) {
+    std::string text = kGraph;
+    text.replace(text.find("[view.image]"), 12, "[view.image, coarse.image]");
+    text += R"(  - id: coarse
+    type: slicer.render
+    in:  { source: head.volume, transfer: tf.transfer, camera: camera.camera }
+    set: { size: [120, 120], slice_distance: 4 }
+    at: [480, 280]
+)";
+    std::ofstream(graph()) << text;
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.wait_for("a picture", [](const json& s) { return shows_final(s, "view.image"); });
+    auto screen_at_rest = [&] {
+        editor.move_to("canvas", 0.02, 0.98);
         editor.idle();
         editor.wait_for("no message", [](const json& s) { return s["message"] == ""; });
         editor.idle();
+        return display.screen();
     };
-    at_rest();
-    const std::string in_parts = slurp(editor.screenshot());
-    at_rest();
-    for (int i = 0; i < 2; ++i) editor.key("t", "ctrl");  // everything has another colour
-    at_rest();
-    const fs::path whole = editor.screenshot();
-    EXPECT_TRUE(in_parts == slurp(whole));
-    keep(whole, "whole");
+    for (const char* mode : {"single", "two", "wipe", "difference"}) {
+        editor.click("node:camera");
+        editor.drag("param:camera.azimuth", "param:camera.elevation");
+        editor.key("F1");
+        editor.with("help");
+        editor.key("F1");
+        editor.key("Tab");
+        editor.with("add-query");
+        editor.type("ph");
+        editor.key("Escape");
+        editor.drag("node:tf", "node:file");
+        editor.drag("picture:0", "state");
+        editor.move_to("node:head");
+        editor.with("tooltip");
+        for (int i = 0; i < 3; ++i) editor.press(4), editor.release(4);  // the wheel
+        editor.move_to("action:undo");
+        const std::string in_parts = screen_at_rest();
+        for (int i = 0; i < 2; ++i) editor.key("t", "ctrl");  // everything has another colour
+        EXPECT_TRUE(in_parts == screen_at_rest()) << mode;
+        keep(editor.screenshot(), std::string("whole-") + mode);
+        editor.key("f");
+        editor.key("c");
+    }
 }
 
 TEST_F(Window, everythingIsReadableOnALargeScreen) {

@@ -233,7 +233,7 @@ void handle_keys(Editor& editor) {
     const bool popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
     for (const Action& a : actions()) {
         // A picture can be taken of anything.
-        if ((io.WantTextInput || popup) && a.key != GLFW_KEY_F12) continue;
+        if ((io.WantTextInput || popup) && a.key != GLFW_KEY_F11 && a.key != GLFW_KEY_F12) continue;
         if (io.KeyCtrl != a.ctrl || io.KeyShift != a.shift || io.KeyAlt) continue;
         if (!ImGui::IsKeyPressed(a.key, false)) continue;
         if (!a.possible || a.possible(editor)) a.run(editor);

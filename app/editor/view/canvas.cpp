@@ -95,10 +95,13 @@ void show_tooltip(Editor& editor, const Hit& hit, const std::vector<Wire>& wires
     // A tooltip over every node would be in the way: what lies under a resting pointer only.
     static double still_since = 0;
     if (ImGui::GetIO().MouseDelta.x != 0 || ImGui::GetIO().MouseDelta.y != 0) still_since = ImGui::GetTime();
-    if (ImGui::GetTime() - still_since < 0.4 || text.empty()) return;
+    const double due = still_since + 0.4;
+    if (text.empty()) return;
+    if (ImGui::GetTime() < due) return changes_at(editor, due);
     ImGui::BeginTooltip();
     ImGui::PushTextWrapPos(ui(340));
     ImGui::TextUnformatted(text.c_str());
+    mark(editor, "tooltip");
     ImGui::PopTextWrapPos();
     ImGui::EndTooltip();
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "app/editor/view/actions.h"
@@ -26,6 +27,8 @@ void say(Editor& editor, std::string message, bool error) {
     editor.message_is_error = error;
     editor.message_until = ImGui::GetTime() + (error ? 6 : 3);
 }
+
+void changes_at(Editor& editor, double time) { editor.next_change = std::min(editor.next_change, time); }
 
 void edit(Editor& editor, const std::function<void()>& f) {
     // A value that is dragged is one step from the button's press to its release.
@@ -310,6 +313,7 @@ void draw_message(Editor& editor) {
         editor.message.clear();
         return;
     }
+    changes_at(editor, editor.message_until);
     const Theme& t = theme();
     const ImVec2 screen = ImGui::GetIO().DisplaySize;
     const std::string message = wrapped(editor.message, std::min(ui(420), screen.x - ui(40)), t.body, t.body->FontSize);
@@ -342,6 +346,7 @@ void let_go_of_unasked(Editor& editor) {
 void draw(Editor& editor) {
     editor.marks.clear();
     editor.moving = false;
+    editor.next_change = std::numeric_limits<double>::infinity();
     editor.picked.clear();
     editor.evaluator.refresh(editor.live);
     handle_keys(editor);
@@ -370,6 +375,8 @@ void draw(Editor& editor) {
     // What is done where the button is let go still belongs to the drag.
     if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) close_drag_step(editor);
     editor.autosave.update(editor.work, ImGui::GetTime());
+    if (editor.autosave.due()) changes_at(editor, ImGui::GetTime() + 0.25);
+    if (ImGui::GetIO().WantTextInput) changes_at(editor, ImGui::GetTime() + 0.2);  // the cursor blinks
     editor.moving = editor.moving || ImGui::GetTime() < editor.moving_until;
     submit_changes(editor);
     let_go_of_unasked(editor);

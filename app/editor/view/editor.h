@@ -208,6 +208,7 @@ struct Editor {
     std::vector<WireEnd> watched;
     bool submitted_coarse = false, ever_submitted = false, moving = false;
     double moving_until = 0;    // a wheel that turns has no button to let go
+    double next_change = 0;     // when the window changes by itself, in ImGui's seconds; see changes_at()
     std::filesystem::path output_folder = "out";
 
     std::map<std::string, SmallPicture> thumbnails;  // by port
@@ -236,6 +237,8 @@ void draw(Editor& editor);
 // Runs f, which edits the document; what it throws is shown at the pointer.
 void edit(Editor& editor, const std::function<void()>& f);
 void say(Editor& editor, std::string message, bool error = false);
+// What is drawn in this frame will be drawn otherwise from then on, also if nothing happens.
+void changes_at(Editor& editor, double time);
 void mark(Editor& editor, std::string name);  // the last item of ImGui
 void mark(Editor& editor, std::string name, ImVec2 lo, ImVec2 hi);
 

@@ -250,8 +250,10 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     if (view.mode == Mode::difference) {
         there = update_difference(editor, value, other, why);
         picture = &view.difference.picture;
-    } else if (view.mode == Mode::flicker && other_there && std::fmod(ImGui::GetTime(), 1.0) > 0.5) {
-        picture = &view.pictures[b];
+    } else if (view.mode == Mode::flicker && other_there) {
+        const double halves = std::floor(2 * ImGui::GetTime());
+        if (std::fmod(halves, 2) == 1) picture = &view.pictures[b];
+        changes_at(editor, (halves + 1) / 2);
     }
     if (!there) return say_in(cell.lo, cell.size, why.empty() ? why_empty(editor, port) : why);
 

@@ -27,8 +27,9 @@ nlohmann::json numbers_to_json(const BranchNumbers& n) {
 
 }  // namespace
 
-std::string screen_to_json(const Editor& editor) {
+std::string screen_to_json(const Editor& editor, bool resting) {
     nlohmann::json json;
+    json["resting"] = resting;
     json["frame"] = ImGui::GetFrameCount();
     json["file"] = editor.work.file.string();
     json["changed"] = editor.work.changed();

@@ -7,12 +7,14 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <memory>
 #include <utility>
 
 #include "app/editor/view/picture.h"
+#include "app/editor/window/input.h"
 #include "app/editor/window/kept_frame.h"
 #include "app/editor/window/screen_file.h"
 #include "core/base/error.h"
@@ -61,7 +63,7 @@ class Window {
         IMGUI_CHECKVERSION();
         ImGui::CreateContext();
         ImGui::GetIO().IniFilename = nullptr;
-        ImGui_ImplGlfw_InitForOpenGL(window_, true);
+        ImGui_ImplGlfw_InitForOpenGL(window_, false);
         ImGui_ImplOpenGL3_Init("#version 330");
     }
     ~Window() {
@@ -108,21 +110,27 @@ void save_picture(const Editor& editor, const fs::path& file) {
     fail("there is no picture to save");
 }
 
-void take_wanted_pictures(Editor& editor, glm::ivec2 size) {
-    const bool picture = std::exchange(editor.picture_wanted, false);
-    if (!std::exchange(editor.screenshot_wanted, false) && !picture) return;
-    const fs::path file = fresh_file(editor, picture ? "picture" : "screenshot");
+template <class Save>
+void take_picture(Editor& editor, const char* name, Save save) {
+    const fs::path file = fresh_file(editor, name);
     try {
-        picture ? save_picture(editor, file) : save_screenshot(file, size.x, size.y);
+        save(file);
         say(editor, "Saved " + fs::absolute(file).lexically_normal().string());
     } catch (const std::exception& e) {
         say(editor, e.what(), true);
     }
 }
 
-void write_screen(const Editor& editor, const fs::path& file) {
+void take_wanted_pictures(Editor& editor, glm::ivec2 size) {
+    if (std::exchange(editor.picture_wanted, false))
+        take_picture(editor, "picture", [&](const fs::path& file) { save_picture(editor, file); });
+    if (std::exchange(editor.screenshot_wanted, false))
+        take_picture(editor, "screenshot", [&](const fs::path& file) { save_screenshot(file, size.x, size.y); });
+}
+
+void write_screen(const Editor& editor, bool resting, const fs::path& file) {
     OutputFile out(file);
-    out.write(screen_to_json(editor));
+    out.write(screen_to_json(editor, resting));
     out.commit();
 }
 
@@ -143,17 +151,20 @@ double thread_cpu_seconds() {
     return double(now.tv_sec) + double(now.tv_nsec) * 1e-9;
 }
 
-// Something changes by itself: a message goes, pictures take turns, what is not saved waits to be.
-bool is_restless(const Editor& editor) {
-    return !editor.message.empty() || editor.autosave.due() || editor.viewport.mode == Viewport::Mode::flicker;
+// From now until the window changes without an event, where its last frame was begun at `begun`; at most a while.
+double seconds_to_change(const Editor& editor, double begun) {
+    constexpr double kLongestRest = 5, kBehind = 0.002;
+    return std::min(editor.next_change + kBehind - ImGui::GetTime() - (glfwGetTime() - begun), kLongestRest);
 }
 
 // False where it is the picture that is on the screen already.
-bool draw_frame(Editor& editor, GLFWwindow* window, KeptFrame& kept) {
+bool draw_frame(Editor& editor, GLFWwindow* window, Input& input, KeptFrame& kept) {
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
+    input.give_to_frame();
     ImGui::NewFrame();
     draw(editor);
+    input.look_for_popups();
     ImGui::Render();
     glm::ivec2 size;
     glfwGetFramebufferSize(window, &size.x, &size.y);
@@ -170,10 +181,8 @@ bool draw_frame(Editor& editor, GLFWwindow* window, KeptFrame& kept) {
 
 int run_window(const EditArguments& arguments, const Registry& registry) {
     Window window(arguments);
+    Input input(window.get());
     KeptFrame kept(window.get());
-    // What the system has thrown away of the window is drawn again.
-    glfwSetWindowUserPointer(window.get(), &kept);
-    glfwSetWindowRefreshCallback(window.get(), [](GLFWwindow* w) { static_cast<KeptFrame*>(glfwGetWindowUserPointer(w))->forget(); });
     // Editors hold textures of the window's context, so they end before it.
     Editor editor(registry, settings_file(), [] { glfwPostEmptyEvent(); });
     editor.output_folder = arguments.out;
@@ -190,26 +199,30 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
     }
 
     const std::stop_callback wake_to_stop(arguments.stop, [] { glfwPostEmptyEvent(); });
+    double begun = glfwGetTime();
     for (int frames = kFramesAfterEvent; !editor.quit && !arguments.stop.stop_requested();) {
         const bool held = ImGui::IsAnyMouseDown() || editor.moving;
-        if (frames > 0 || held)
+        const double rest = seconds_to_change(editor, begun);
+        if (frames > 0 || held || input.waits() || rest <= 0)
             glfwPollEvents();
         else
-            glfwWaitEventsTimeout(is_restless(editor) ? 0.25 : 5.0);
+            glfwWaitEventsTimeout(rest);
         frames = frames > 0 ? frames - 1 : kFramesAfterEvent;
         if (glfwWindowShouldClose(window.get())) {
             glfwSetWindowShouldClose(window.get(), GLFW_FALSE);
             unless_changed(editor, [&editor] { editor.quit = true; });
         }
-        const double begun = glfwGetTime(), cpu_begun = thread_cpu_seconds();
+        begun = glfwGetTime();
+        const double cpu_begun = thread_cpu_seconds();
+        if (input.take_exposed()) kept.forget();
         if (editor.theme_changed) {
             set_theme(editor, screen_scale);
             kept.forget();
         }
-        if (draw_frame(editor, window.get(), kept)) remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
-        if (!arguments.screen.empty()) write_screen(editor, arguments.screen);
+        if (draw_frame(editor, window.get(), input, kept)) remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
+        if (!arguments.screen.empty()) write_screen(editor, frames == 0 && !input.waits(), arguments.screen);
         // Software renderers do not wait for the screen.
-        if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && spare > 0)
+        if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && !input.waits() && spare > 0)
             glfwWaitEventsTimeout(spare);
     }
     delete_textures(editor);
