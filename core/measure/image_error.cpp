@@ -84,28 +84,28 @@ double windowed(const double* values, int n, std::size_t stride, int c) {
     return sum / weight;
 }
 
-Plane smooth(const Plane& p) {
+Plane smooth(const Plane& p, const std::stop_token& stop) {
     const Centres across = centres_of(p.width), down = centres_of(p.height);
     Plane rows(across.count, p.height);
     parallel_for(0, p.height, 16, [&](std::int64_t lo, std::int64_t hi) {
         for (int y = int(lo); y < int(hi); ++y)
             for (int x = 0; x < rows.width; ++x)
                 rows.row(y)[x] = windowed(p.row(y), p.width, 1, across.first + x);
-    });
+    }, stop);
     Plane all(across.count, down.count);
     parallel_for(0, all.height, 16, [&](std::int64_t lo, std::int64_t hi) {
         for (int y = int(lo); y < int(hi); ++y)
             for (int x = 0; x < all.width; ++x)
                 all.row(y)[x] = windowed(rows.row(0) + x, p.height, std::size_t(rows.width),
                                          down.first + y);
-    });
+    }, stop);
     return all;
 }
 
-double ssim_of(const Plane& a, const Plane& b) {
+double ssim_of(const Plane& a, const Plane& b, const std::stop_token& stop) {
     constexpr double c1 = 0.01 * 0.01, c2 = 0.03 * 0.03;
-    const Plane ma = smooth(a), mb = smooth(b);
-    const Plane aa = smooth(product(a, a)), bb = smooth(product(b, b)), ab = smooth(product(a, b));
+    const Plane ma = smooth(a, stop), mb = smooth(b, stop);
+    const Plane aa = smooth(product(a, a), stop), bb = smooth(product(b, b), stop), ab = smooth(product(a, b), stop);
     Sum sum;
     for (std::size_t i = 0; i < ma.values.size(); ++i) {
         const double x = ma.values[i], y = mb.values[i];
@@ -123,14 +123,15 @@ std::string problem_with_comparison(glm::ivec2 size, glm::ivec2 reference) {
                        size.x, size.y, reference.x, reference.y);
 }
 
-ImageError compare_images(const Image& image, const Image& reference) {
+ImageError compare_images(const Image& image, const Image& reference, const std::stop_token& stop) {
     if (std::string problem = problem_with_comparison(image.size(), reference.size()); !problem.empty())
         fail("{}", problem);
     const glm::ivec2 size = image.size();
     ImageError e;
     Sum squares;
     std::uint64_t off = 0, all = std::uint64_t(size.x) * std::uint64_t(size.y);
-    for (int y = 0; y < size.y; ++y)
+    for (int y = 0; y < size.y; ++y) {
+        check_stop(stop);
         for (int x = 0; x < size.x; ++x) {
             const glm::vec4 c = image.at(x, y), r = reference.at(x, y);
             if (!finite(c) || !finite(r)) {
@@ -146,6 +147,7 @@ ImageError compare_images(const Image& image, const Image& reference) {
                 e.max_error_at = {x, y};
             }
         }
+    }
     if (e.pixels == 0) {
         e.rmse = e.max_error = e.psnr = kNaN;
     } else {
@@ -154,23 +156,25 @@ ImageError compare_images(const Image& image, const Image& reference) {
     }
     if (all > 0) {
         e.share_off = double(off + e.mismatched) / double(all);
-        e.ssim = ssim_of(luma_of(image), luma_of(reference));
+        e.ssim = ssim_of(luma_of(image), luma_of(reference), stop);
     }
     return e;
 }
 
-ImagePtr difference_image(const Image& image, const Image& reference, double scale) {
+ImagePtr difference_image(const Image& image, const Image& reference, double scale, const std::stop_token& stop) {
     if (std::string problem = problem_with_comparison(image.size(), reference.size()); !problem.empty())
         fail("{}", problem);
     auto difference = std::make_shared<Image>(image.size(), Image::Format::rgba32f);
     glm::vec4* out = difference->rgba32f().data();
-    for (int y = 0; y < image.size().y; ++y)
+    for (int y = 0; y < image.size().y; ++y) {
+        check_stop(stop);
         for (int x = 0; x < image.size().x; ++x) {
             const glm::vec4 c = image.at(x, y), r = reference.at(x, y);
             glm::vec3 d = glm::abs(glm::vec3(c) - glm::vec3(r)) * float(scale);
             if (!finite(c) || !finite(r)) d = glm::vec3(finite(c) != finite(r) ? 1.0f : 0.0f);
             *out++ = glm::vec4(d, 1.0f);
         }
+    }
     return difference;
 }
 

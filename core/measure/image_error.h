@@ -11,6 +11,7 @@
 #pragma once
 
 #include <cstdint>
+#include <stop_token>
 #include <string>
 
 #include "core/data/image.h"
@@ -28,13 +29,14 @@ struct ImageError {
     double share_off = 0;          // of the pixels, where a channel is off by more than 1/255
 };
 
-// Throws Error where the sizes differ.
-ImageError compare_images(const Image& image, const Image& reference);
+// Throws Error where the sizes differ, and Cancelled.
+ImageError compare_images(const Image& image, const Image& reference, const std::stop_token& stop = {});
 
 // Why the two cannot be compared, or empty.
 std::string problem_with_comparison(glm::ivec2 size, glm::ivec2 reference);
 
 // |image - reference| * scale in red, green and blue, opaque; where one side alone is not finite: 1.
-ImagePtr difference_image(const Image& image, const Image& reference, double scale);
+// Throws as compare_images().
+ImagePtr difference_image(const Image& image, const Image& reference, double scale, const std::stop_token& stop = {});
 
 }  // namespace voxloom

@@ -37,8 +37,7 @@ void describe_node(Description& d) {
 
 void evaluate_node(Evaluation& ev) {
     const ImagePtr image = ev.input<Image>("image"), reference = ev.input<Image>("reference");
-    check_stop(ev.stop());
-    const ImageError e = compare_images(*image, *reference);
+    const ImageError e = compare_images(*image, *reference, ev.stop());
     Row row(ev, ev.params().text("label"));
     row.add("rmse", e.rmse).add("psnr", e.psnr, "dB").add("ssim", e.ssim);
     row.add("max_error", e.max_error);
@@ -46,8 +45,7 @@ void evaluate_node(Evaluation& ev) {
     row.add("share_off", e.share_off);
     row.count("pixels", e.pixels).count("mismatched", e.mismatched);
     ev.output("table", row.table());
-    check_stop(ev.stop());
-    ev.output("difference", difference_image(*image, *reference, ev.params().real("scale")));
+    ev.output("difference", difference_image(*image, *reference, ev.params().real("scale"), ev.stop()));
 }
 
 }  // namespace

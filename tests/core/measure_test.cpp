@@ -370,6 +370,16 @@ TEST(ImageError, DrawsTheDifference) {
     EXPECT_EQ(d->at(1, 0), glm::vec4(1.0f));
 }
 
+TEST(ImageError, EndsWhenItIsStopped) {
+    const Image a = picture(40, 30, texture);
+    std::stop_source stop;
+    EXPECT_EQ(compare_images(a, a, stop.get_token()).rmse, 0);
+    EXPECT_EQ(difference_image(a, a, 2, stop.get_token())->at(7, 7), glm::vec4(0, 0, 0, 1));
+    stop.request_stop();
+    EXPECT_THROW(compare_images(a, a, stop.get_token()), Cancelled);
+    EXPECT_THROW(difference_image(a, a, 2, stop.get_token()), Cancelled);
+}
+
 TEST(ImageError, NamesBothSizesWhereTheyDiffer) {
     Image a({4, 4}, Image::Format::rgba8), b({4, 5}, Image::Format::rgba8);
     EXPECT_THROW(compare_images(a, b), Error);
