@@ -251,6 +251,34 @@ TEST_F(Branches, whatWasTriedIsKeptOnceAndComesBackInOneStep) {
     EXPECT_EQ(tried.back().seconds, 601);
 }
 
+TEST_F(Branches, areDecodedForAPlaceAmongWhatWasTriedWhereNothingElseTellsTheirError) {
+    const Branch view = branch("view");
+    EXPECT_FALSE(needs_decoding(view, state)) << "there is nothing to decode yet";
+    EXPECT_FALSE(needs_decoding(branch("direct"), state));
+    finish("code", 1);
+    EXPECT_TRUE(needs_decoding(view, state));
+    std::vector<Tried> tried;
+    collect_tried(tried, {view}, {}, state);
+    EXPECT_TRUE(tried.empty());
+    auto decoded = std::make_shared<Decoded>();
+    decoded->psnr = 39;
+    OwnMeasures own;
+    own.decoded = decoded;
+    collect_tried(tried, {view}, {own}, state);
+    ASSERT_EQ(tried.size(), 1u);
+    EXPECT_EQ(tried[0].psnr, 39);
+    finish("code", 2, {{"psnr", {40, "dB"}}});
+    EXPECT_FALSE(needs_decoding(view, state)) << "it says so itself";
+    finish("code", 3);
+    table("wrong", "psnr", 41);
+    EXPECT_FALSE(needs_decoding(view, state)) << "a node measures it";
+    finish("code", 4, {{"psnr", {-INFINITY, "dB"}}});
+    state.values.clear();
+    tried.clear();
+    collect_tried(tried, {view}, {}, state);
+    EXPECT_TRUE(tried.empty()) << "of a constant there is no such number, and no place in a plot";
+}
+
 TEST_F(Branches, aSweepGoesOverTheParameterThatIsInUse) {
     std::optional<Sweep> sweep = sweep_of(document.graph(), nodes, "code");
     ASSERT_TRUE(sweep);

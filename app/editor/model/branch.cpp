@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "app/editor/model/param_values.h"
@@ -152,6 +153,10 @@ Compared compared_of(const Branch& b, const Evaluator::State& state) {
     return compared;
 }
 
+bool needs_decoding(const Branch& branch, const Evaluator::State& state) {
+    return finished(state, branch.codec) && !numbers_of(branch, state).psnr;
+}
+
 std::string id_without_codec(const std::string& id) { return id + "~"; }
 bool is_without_codec(std::string_view id) { return id.ends_with('~'); }
 
@@ -184,7 +189,7 @@ void collect_tried(std::vector<Tried>& tried, const std::vector<Branch>& branche
         if (!status || !node) continue;
         const bool known = std::ranges::any_of(tried, [&](const Tried& t) { return t.codec == branch.codec && t.key == status->key; });
         const BranchNumbers numbers = numbers_of(branch, state, i < own.size() ? own[i] : OwnMeasures{});
-        if (known || !numbers.encode || !numbers.psnr || std::isnan(*numbers.psnr)) continue;
+        if (known || !numbers.encode || !numbers.psnr || !(*numbers.psnr > -std::numeric_limits<double>::infinity())) continue;
         if (tried.size() >= kMostTried) tried.erase(tried.begin());
         tried.push_back({branch.codec, status->key, node->params, *numbers.encode, *numbers.psnr});
     }

@@ -55,6 +55,9 @@ struct Compared {
 };
 Compared compared_of(const Branch& branch, const Evaluator::State& state);
 
+// Its codec has run and neither says how wrong it is, nor does a node of the graph: only decoding tells.
+bool needs_decoding(const Branch& branch, const Evaluator::State& state);
+
 // The nodes that draw the branch's picture without its codec: copies of those from the codec on, those that
 // code and decode bypassed, named id_without_codec(). No node of a document has such a name.
 std::vector<GraphNode> nodes_without_codec(const Graph& graph, const Registry& registry, const Branch& branch);

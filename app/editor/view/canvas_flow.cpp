@@ -38,7 +38,15 @@ std::pair<std::string, std::string> flow_lines(const ValueDesc& desc, std::uint6
     return {size, type};
 }
 
+void draw_reason(const Pen& pen, const std::string& reason, const NodeBox& room) {
+    if (!pen.readable()) return;
+    pen.list.PushClipRect(pen.at(room.at), pen.at(room.at + room.size), true);
+    pen.list.AddText(theme().body, pen.px(11), pen.at(room.at + glm::dvec2(4, 2)), pen.color(theme().bad), reason.c_str(), nullptr, pen.px(room.size.x - 8));
+    pen.list.PopClipRect();
+}
+
 void draw_picture(const Pen& pen, const SmallPicture& small, const NodeBox& room) {
+    if (!small.problem.empty()) return draw_reason(pen, small.problem, room);
     const double height = std::min(room.size.y, room.size.x / small.thumbnail->aspect);
     const glm::dvec2 size(height * small.thumbnail->aspect, height);
     const glm::dvec2 at = room.at + (room.size - size) * 0.5;

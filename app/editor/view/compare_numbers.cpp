@@ -31,20 +31,23 @@ std::shared_ptr<const void> address_of(const Value& value) {
 }
 
 // Only while nothing else runs, else it is stopped and begins anew at rest: it would take processors from the graph, what
-// moves will be another one soon, and times would be those of a busy machine.
-OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& reference, bool at_rest) {
+// moves will be another one soon, and times would be those of a busy machine. In a sweep each value is soon followed
+// by the next one, and waits only for what tells how wrong it is.
+OwnMeasures measure(Editor& editor, const Branch& branch, const WireEnd& reference) {
+    const bool idle = !editor.live.busy && !editor.moving && !editor.submitted_coarse, at_rest = idle && !editor.sweep;
+    const bool decodes = idle && (!editor.sweep || (branch.codec == editor.sweep->node && needs_decoding(branch, editor.live)));
     OwnMeasures own;
     own.image_first = editor.viewport.against != Against::first;
     if (const Compared c = compared_of(branch, editor.live); c.bricks) {
         auto make = [c](const std::stop_token& stop) { return decode_all(c.bricks, c.original, stop); };
-        const auto found = editor.decoded.find({c.bricks, address_of(c.original)}, at_rest ? Background<Decoded>::Make(make) : nullptr);
+        const auto found = editor.decoded.find({c.bricks, address_of(c.original)}, decodes ? Background<Decoded>::Make(make) : nullptr);
         own.decoded = found.made;
         own.decoding = found.pending();
         own.decode_problem = found.made ? found.made->problem : found.problem;
     }
     const ImagePtr image = fresh_image(editor, branch.picture), other = fresh_image(editor, reference);
     if (!image || !other || !problem_with_comparison(image->size(), other->size()).empty()) return own;
-    auto make = [image, other](const std::stop_token&) { return std::make_shared<const ImageError>(compare_images(*image, *other)); };
+    auto make = [image, other](const std::stop_token& stop) { return std::make_shared<const ImageError>(compare_images(*image, *other, stop)); };
     const auto found = editor.image_errors.find({image, other}, at_rest ? Background<ImageError>::Make(make) : nullptr);
     own.image = found.made;
     own.comparing = found.pending();
@@ -125,10 +128,9 @@ void update_branches(Editor& editor) {
         editor.branches.clear();
         for (const WireEnd& port : editor.watched) editor.branches.push_back(branch_of(editor.work.graph(), editor.registry, port));
     }
-    const bool at_rest = !editor.live.busy && !editor.moving && !editor.submitted_coarse && !editor.sweep;
     editor.measures.assign(editor.branches.size(), {});
     for (std::size_t k = 0; k < std::min(editor.branches.size(), editor.references.size()); ++k)
-        editor.measures[k] = measure(editor, editor.branches[k], editor.references[k], at_rest);
+        editor.measures[k] = measure(editor, editor.branches[k], editor.references[k]);
 }
 
 double numbers_width(std::size_t branches) { return kNames + (branches > 2 ? kColumn : kWideColumn) * double(branches); }

@@ -123,7 +123,7 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches) {
         if (branch.codec.empty() || !codecs.insert(branch.codec).second) continue;
         const std::optional<Sweep> sweep = sweep_of(editor.work.graph(), editor.registry, branch.codec);
         ImGui::BeginDisabled(!sweep);
-        if (ImGui::Button(("Sweep " + branch.codec).c_str())) editor.sweep = sweep;
+        if (ImGui::Button(("Sweep " + branch.codec).c_str())) editor.sweep = sweep, editor.viewport.numbers = true;
         ImGui::EndDisabled();
         mark(editor, "sweep:" + branch.codec);
         tooltip(sweep ? fmt::format("Tries {} values of {}; the graph stays as it is.", sweep->values.size(), sweep->param)

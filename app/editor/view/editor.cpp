@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 Editor::Editor(const Registry& nodes, fs::path remembered, std::function<void()> wake)
     : registry(nodes), settings_file(std::move(remembered)), settings(load_settings(settings_file)),
       examples(find_examples()),
-      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 8), decoded(wake), image_errors(wake), loaded(wake, 1), picks(wake, 2), evaluator(nodes, wake) {}
+      recovered(find_recoverable(autosave_folder())), ask_about_recovery(!recovered.empty()), histograms(wake), gradients(wake, 8), small_pictures(wake, 1024), differences(wake, 1), decoded(wake), image_errors(wake), loaded(wake, 1), picks(wake, 2), evaluator(nodes, wake) {}
 
 // --- small things that all regions use -----------------------------------------------------------
 
@@ -235,12 +235,19 @@ void submit(Editor& editor, const Graph& graph, bool coarse, bool write) {
 
 namespace {
 
-// One value after the other, each when the one before has been computed; then the document again, which
-// any change of it ends the sweep for.
+// Of the codec's newest value there is all that will be.
+bool is_measured(const Editor& editor, const Sweep& sweep) {
+    for (std::size_t k = 0; k < editor.branches.size(); ++k)
+        if (editor.branches[k].codec == sweep.node && needs_decoding(editor.branches[k], editor.live) && editor.measures[k].decoding) return false;
+    return true;
+}
+
+// One value after the other, each when the one before has been computed and measured; then the document again, which
+// any change of it ends the sweep for. So does leaving the comparison: nobody sees then what comes of it.
 void go_on_with_sweep(Editor& editor) {
     Sweep& sweep = *editor.sweep;
-    if (!same_results(editor.submitted, editor.work.graph())) return editor.sweep.reset();
-    if (editor.live.busy) return;
+    if (editor.viewport.mode == Viewport::Mode::single || !same_results(editor.submitted, editor.work.graph())) return editor.sweep.reset();
+    if (editor.live.busy || !is_measured(editor, sweep)) return;
     if (sweep.next < sweep.values.size()) return submit(editor, graph_with(editor.work.graph(), sweep, sweep.next++), false, false);
     editor.sweep.reset();
 }
@@ -331,14 +338,10 @@ void draw_message(Editor& editor) {
     mark(editor, "message", at, hi);
 }
 
-// Where the pointer rests on a picture its volume is asked for in every frame. What had to be loaded whole for that waits for
-// it to come back, no longer than this; a window at rest looks every few seconds.
-constexpr double kKeepLoadedSeconds = 30;
-
 void let_go_of_unasked(Editor& editor) {
     auto each = [](auto&... backgrounds) { (backgrounds.let_go_of_unasked(), ...); };
     each(editor.histograms, editor.gradients, editor.small_pictures, editor.differences, editor.decoded, editor.image_errors, editor.picks);
-    if (ImGui::GetTime() > editor.loaded_used + kKeepLoadedSeconds) editor.loaded.clear();
+    if (editor.loaded_kept.is_over(ImGui::GetTime())) editor.loaded.clear();
 }
 
 }  // namespace

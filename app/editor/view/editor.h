@@ -18,6 +18,7 @@
 #include "app/editor/model/commands.h"
 #include "app/editor/model/evaluator.h"
 #include "app/editor/model/histogram.h"
+#include "app/editor/model/kept.h"
 #include "app/editor/model/knobs.h"
 #include "app/editor/model/pick.h"
 #include "app/editor/model/settings.h"
@@ -91,6 +92,7 @@ struct Difference {
 struct SmallPicture {
     Picture picture;
     std::shared_ptr<const Thumbnail> thumbnail;  // in the texture
+    std::string problem;                         // why there is none of what flows now
 };
 
 // Pictures, alone or compared; all are moved and magnified together.
@@ -227,7 +229,9 @@ struct Editor {
     Background<Decoded> decoded;
     Background<ImageError> image_errors;
     Background<Volume> loaded;  // one, whole, to be picked from
-    double loaded_used = 0;     // when that was last done
+    // Where the pointer rests on a picture its volume is asked for in every frame. What had to be loaded whole for that waits
+    // for it to come back, no longer than this; a window at rest looks every few seconds.
+    Kept loaded_kept{30};
     Background<Picked> picks;   // few: the pointer soon is elsewhere
     Evaluator evaluator;        // the last: it ends first
 };

@@ -71,8 +71,8 @@ bool update_difference(Editor& editor, const LiveValue* a, const LiveValue* b, s
     Difference& d = editor.viewport.difference;
     const ImagePtr x = std::get<ImagePtr>(a->value), y = std::get<ImagePtr>(b->value);
     const double scale = d.scale;
-    const auto found = editor.differences.find({x, y, scale}, [x, y, scale](const std::stop_token&) -> ImagePtr {
-        return difference_image(*x, *y, scale);
+    const auto found = editor.differences.find({x, y, scale}, [x, y, scale](const std::stop_token& stop) -> ImagePtr {
+        return difference_image(*x, *y, scale, stop);
     });
     if (found.made && found.made != d.shown) {
         upload(editor, d.picture, *found.made);
@@ -102,28 +102,29 @@ void delete_textures(Editor& editor) {
 SmallPicture* small_picture(Editor& editor, const std::string& node, const NodePorts& ports) {
     for (const PortSpec& port : ports.outputs) {
         const std::string name = node + "." + port.key;
-        std::shared_ptr<const Thumbnail> made;
+        Background<Thumbnail>::Found found;
         if (auto value = editor.live.values.find(name); value != editor.live.values.end()) {
             const ImagePtr* image = std::get_if<ImagePtr>(&value->second.value);
             if (!image) continue;
             // While something moves the last whole picture stays.
             if (value->second.fresh)
-                made = editor.small_pictures.find({*image}, [image = *image](const std::stop_token&) { return thumbnail_of(*image); }).made;
-        } else if (auto found = editor.live.volumes.find(name); found != editor.live.volumes.end()) {
-            if (const VolumePtr volume = found->second.lock())
-                made = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); }).made;
+                found = editor.small_pictures.find({*image}, [image = *image](const std::stop_token&) { return thumbnail_of(*image); });
+        } else if (auto dense = editor.live.volumes.find(name); dense != editor.live.volumes.end()) {
+            if (const VolumePtr volume = dense->second.lock())
+                found = editor.small_pictures.find({volume}, [volume](const std::stop_token& stop) { return thumbnail_of(*volume, stop); });
         } else if (auto compressed = editor.live.bricks.find(name); compressed != editor.live.bricks.end()) {
             if (const BricksPtr bricks = compressed->second.lock())
-                made = editor.small_pictures.find({bricks}, [bricks](const std::stop_token& stop) { return thumbnail_of(bricks, BrickCache::global(), stop); }).made;
+                found = editor.small_pictures.find({bricks}, [bricks](const std::stop_token& stop) { return thumbnail_of(bricks, BrickCache::global(), stop); });
         } else {
             continue;
         }
         SmallPicture& small = editor.thumbnails[name];
-        if (made && made != small.thumbnail && made->size.x > 0) {
-            upload(editor, small.picture, made->size, made->pixels);
-            small.thumbnail = made;
+        if (found.made && found.made != small.thumbnail && found.made->size.x > 0) {
+            upload(editor, small.picture, found.made->size, found.made->pixels);
+            small.thumbnail = found.made;
         }
-        return small.thumbnail ? &small : nullptr;
+        if (!found.pending()) small.problem = found.problem;
+        return small.thumbnail || !small.problem.empty() ? &small : nullptr;
     }
     return nullptr;
 }

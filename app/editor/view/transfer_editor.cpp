@@ -30,6 +30,7 @@ struct Scene {
     TransferPtr function{};
     VolumePtr data{};
     std::shared_ptr<const Histogram> histogram{};
+    std::string problem{};        // why there is no histogram
     ImVec2 lo{}, hi{};            // of the plot, in pixels
 
     double share(double value) const { return range.extent() > 0 ? (value - range.min) / range.extent() : 0.5; }
@@ -68,10 +69,13 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     for (const auto& [port, value] : editor.live.values)
         if (auto* f = std::get_if<TransferPtr>(&value.value); f && port.starts_with(node.id + ".")) s.function = *f;
     s.data = data_of(editor, node);
-    if (const VolumePtr volume = s.data)
-        s.histogram = editor.histograms.find({volume}, [volume](const std::stop_token& stop) {
+    if (const VolumePtr volume = s.data) {
+        const auto found = editor.histograms.find({volume}, [volume](const std::stop_token& stop) {
             return std::make_shared<const Histogram>(histogram_of(*volume, stop));
-        }).made;
+        });
+        s.histogram = found.made;
+        s.problem = found.problem;
+    }
     if (s.histogram) s.range = s.histogram->range;
     else if (s.function && s.function->one.points.size() > 1)
         s.range = {s.function->one.points.front().value, s.function->one.points.back().value};
@@ -82,7 +86,14 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     return s;
 }
 
+void draw_reason(const Scene& s, const std::string& reason) {
+    const float left = s.lo.x + ui(40);
+    ImGui::GetWindowDrawList()->AddText(theme().body, theme().body->FontSize, {left, s.lo.y + ui(8)}, theme().bad, reason.c_str(), nullptr,
+                                        std::max(s.hi.x - ui(8) - left, 1.f));
+}
+
 void draw_histogram(const Scene& s) {
+    if (!s.problem.empty()) return draw_reason(s, s.problem);
     if (!s.histogram || s.histogram->counts.empty()) return;
     ImDrawList& list = *ImGui::GetWindowDrawList();
     const auto& counts = s.histogram->counts;
@@ -103,12 +114,14 @@ void draw_histogram(const Scene& s) {
 void draw_gradients(const Scene& s) {
     TransferEditor& state = s.editor.transfer;
     const VolumePtr volume = s.data;
+    if (!s.problem.empty()) return draw_reason(s, s.problem);
     if (!state.gradients || !volume || !s.histogram) return;
     const ValueRange range = s.histogram->range;
-    const auto made = s.editor.gradients.find({volume}, [volume, range](const std::stop_token& stop) {
+    const auto found = s.editor.gradients.find({volume}, [volume, range](const std::stop_token& stop) {
         return std::make_shared<const GradientHistogram>(gradient_histogram_of(*volume, range, stop));
-    }).made;
-    if (!made) return;
+    });
+    const auto& made = found.made;
+    if (!made) return draw_reason(s, found.problem);
     if (made != state.shown) {
         const double most = std::log1p(*std::ranges::max_element(made->counts));
         std::vector<glm::u8vec4> pixels;

@@ -207,7 +207,7 @@ void ask_what_is_seen(Editor& editor, const WireEnd& port, const LiveValue& valu
     // What cannot be read by region is loaded once, as long as it is the same one.
     if (const VolumePtr volume = scene->volume; !volume->reads_by_region()) {
         const auto loaded = editor.loaded.find({volume}, [volume](const std::stop_token& stop) { return in_memory(volume, stop); });
-        editor.loaded_used = ImGui::GetTime();
+        editor.loaded_kept.use(ImGui::GetTime());
         editor.picked = loaded.problem;
         if (!loaded.made) return;
         scene->volume = loaded.made;
