@@ -65,6 +65,21 @@ TEST(Damage, isWhereSomethingWasAndWhereItIs) {
     EXPECT_EQ(damage({{"a", {}, {}, {}}, {"b", {}, {}, {}}}, {{"b", {}, {}, {}}, {"a", {}, {}, {}}}, kSize), (std::vector<Rect>{{{0, 0}, kSize}}));
 }
 
+// Every rectangle is a pass over all triangles: the more there are, the fewer rectangles.
+TEST(Damage, isOneRectangleWhereManyTrianglesMove) {
+    constexpr glm::ivec2 kLarge(1600, 900);
+    auto moved_by = [&](float x, int still) {
+        std::vector<DrawnList> lists{{"a", {}, {}, {}}};
+        const glm::vec4 all(0, 0, kLarge.x, kLarge.y);
+        for (int i = 0; i < still; ++i) add_box(lists[0], {1, 1}, {2, 2}, 1, 1, all);
+        for (const glm::vec2 corner : {glm::vec2(0), glm::vec2(300, 0), glm::vec2(0, 300), glm::vec2(300, 300)})
+            add_box(lists[0], corner + x, corner + 40.f + x, 2, 1, all);
+        return lists;
+    };
+    EXPECT_EQ(damage(moved_by(100, 0), moved_by(101, 0), kLarge).size(), 4U);
+    EXPECT_EQ(damage(moved_by(100, 10000), moved_by(101, 10000), kLarge), (std::vector<Rect>{{{99, 99}, {442, 442}}}));
+}
+
 TEST(Damage, leavesTheRestAsItIs) {
     std::mt19937 random(5);
     auto below = [&](int n) { return int(random() % unsigned(n)); };

@@ -9,23 +9,26 @@ namespace voxloom::editor {
 namespace {
 
 constexpr std::size_t kMostRects = 6;
-constexpr double kMostShare = 0.4;  // of the window; then all of it is drawn
-constexpr double kSpare = 4096;  // pixels that are rather drawn too many than a rectangle more
+constexpr double kMostShare = 0.75;  // of the window; then all of it is drawn
+// Pixels that are rather drawn too many than a rectangle more: for every one all triangles are handed over again.
+constexpr double kSpare = 4096, kSpareATriangle = 8;
 
+bool contains(const Rect& a, const Rect& b) { return glm::all(glm::lessThanEqual(a.lo, b.lo)) && glm::all(glm::greaterThanEqual(a.hi, b.hi)); }
 double area(const Rect& r) { return double(r.hi.x - r.lo.x) * double(r.hi.y - r.lo.y); }
 Rect both(const Rect& a, const Rect& b) { return {glm::min(a.lo, b.lo), glm::max(a.hi, b.hi)}; }
 double waste(const Rect& a, const Rect& b) { return area(both(a, b)) - area(a) - area(b); }
 
 class Rects {
   public:
-    explicit Rects(glm::ivec2 size) : size_(size) {}
+    Rects(glm::ivec2 size, std::size_t triangles) : size_(size), spare_(kSpare + kSpareATriangle * double(triangles)) {}
 
     void add(Rect r) {
         r = {glm::clamp(r.lo, glm::ivec2(0), size_), glm::clamp(r.hi, glm::ivec2(0), size_)};
         if (r.lo.x >= r.hi.x || r.lo.y >= r.hi.y) return;
+        if (std::ranges::any_of(rects_, [&](const Rect& other) { return contains(other, r); })) return;
         // What is near is one; that may bring it near to others.
         for (bool merged = true; merged;) {
-            const auto near = std::ranges::find_if(rects_, [&](const Rect& other) { return waste(r, other) <= kSpare; });
+            const auto near = std::ranges::find_if(rects_, [&](const Rect& other) { return waste(r, other) <= spare_; });
             merged = near != rects_.end();
             if (!merged) break;
             r = both(r, *near);
@@ -49,6 +52,7 @@ class Rects {
 
   private:
     glm::ivec2 size_;
+    double spare_;
     bool most_ = false;
     std::vector<Rect> rects_;
 };
@@ -122,7 +126,9 @@ std::vector<Rect> damage(const std::vector<DrawnList>& before, const std::vector
     std::map<std::string, std::size_t> places;
     for (std::size_t i = 0; i < before.size(); ++i)
         if (!places.emplace(before[i].name, i).second) return everything;
-    Rects rects(size);
+    std::size_t indices = 0;
+    for (const DrawnList& list : now) indices += list.indices.size();
+    Rects rects(size, indices / 3);
     std::size_t next = 0;  // the places of what is in both must rise
     std::vector<bool> met(before.size());
     for (const DrawnList& list : now) {
