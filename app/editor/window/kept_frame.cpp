@@ -3,7 +3,6 @@
 #define GLFW_INCLUDE_NONE
 #include <GL/gl.h>
 #include <GLFW/glfw3.h>
-#include <backends/imgui_impl_opengl3.h>
 
 #include <algorithm>
 #include <bit>
@@ -21,8 +20,9 @@ std::vector<DrawnList> lists_of(const ImDrawData& data) {
         const ImDrawList& from = *data.CmdLists[i];
         DrawnList& to = lists[i];
         to.name = from._OwnerName ? from._OwnerName : "";
-        to.vertices.reserve(std::size_t(from.VtxBuffer.Size));
-        for (const ImDrawVert& v : from.VtxBuffer) to.vertices.push_back({{v.pos.x, v.pos.y}, {v.uv.x, v.uv.y}, v.col});
+        to.vertices.resize(std::size_t(from.VtxBuffer.Size));
+        std::transform(from.VtxBuffer.begin(), from.VtxBuffer.end(), to.vertices.begin(),
+                       [](const ImDrawVert& v) { return DrawnVertex{{v.pos.x, v.pos.y}, {v.uv.x, v.uv.y}, v.col}; });
         to.indices.assign(from.IdxBuffer.begin(), from.IdxBuffer.end());
         for (const ImDrawCmd& c : from.CmdBuffer)
             to.commands.push_back({{c.ClipRect.x, c.ClipRect.y, c.ClipRect.z, c.ClipRect.w}, std::bit_cast<std::uintptr_t>(c.TextureId), c.VtxOffset, c.IdxOffset, c.ElemCount});
@@ -35,16 +35,6 @@ void snap_clips(ImDrawData& data) {
     for (int i = 0; i < data.CmdListsCount; ++i)
         for (ImDrawCmd& c : data.CmdLists[i]->CmdBuffer)
             c.ClipRect = {std::floor(c.ClipRect.x), std::floor(c.ClipRect.y), std::ceil(c.ClipRect.z), std::ceil(c.ClipRect.w)};
-}
-
-// Everything is drawn in this rectangle alone.
-void clip_to(ImDrawData& data, const std::vector<DrawnList>& lists, const Rect& r) {
-    for (std::size_t i = 0; i < lists.size(); ++i)
-        for (std::size_t c = 0; c < lists[i].commands.size(); ++c) {
-            const glm::vec4& clip = lists[i].commands[c].clip;
-            data.CmdLists[i]->CmdBuffer[int(c)].ClipRect = {std::max(clip.x, float(r.lo.x)), std::max(clip.y, float(r.lo.y)),
-                                                            std::min(clip.z, float(r.hi.x)), std::min(clip.w, float(r.hi.y))};
-        }
 }
 
 bool is_software(const GLubyte* renderer) {
@@ -85,16 +75,10 @@ bool KeptFrame::draw(ImDrawData& data, glm::ivec2 size, ImVec4 background) {
         if (copy_ && data.FramebufferScale.x == 1 && data.FramebufferScale.y == 1) drawn_ = damaged;
     }
     lists_ = std::move(lists);
-    glClearColor(background.x, background.y, background.z, 1);
-    for (const Rect& r : drawn_) {
-        glViewport(0, 0, size.x, size.y);
-        glEnable(GL_SCISSOR_TEST);
-        glScissor(r.lo.x, size.y - r.hi.y, r.hi.x - r.lo.x, r.hi.y - r.lo.y);
-        glClear(GL_COLOR_BUFFER_BIT);
-        glDisable(GL_SCISSOR_TEST);
-        if (copy_ && drawn_ != std::vector<Rect>{{glm::ivec2(0), size}}) clip_to(data, lists_, r);
-        ImGui_ImplOpenGL3_RenderDrawData(&data);
-    }
+    const ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
+    painter_.load(lists_, {std::bit_cast<std::uintptr_t>(fonts.TexID), {fonts.TexUvWhitePixel.x, fonts.TexUvWhitePixel.y}}, size,
+                  {data.FramebufferScale.x, data.FramebufferScale.y});
+    for (const Rect& r : drawn_) painter_.draw(r, {background.x, background.y, background.z});
     return true;
 }
 

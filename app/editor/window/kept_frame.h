@@ -6,7 +6,7 @@
 
 #include <vector>
 
-#include "app/editor/model/damage.h"
+#include "app/editor/window/painter.h"
 
 struct GLFWwindow;
 
@@ -38,6 +38,7 @@ class KeptFrame {
     CopySubBuffer copy_ = nullptr;  // null: buffers are swapped, and nothing is known of the one behind
     void* display_ = nullptr;
     unsigned long drawable_ = 0;
+    Painter painter_;
     glm::ivec2 size_{0};
     std::vector<DrawnList> lists_;
     std::vector<Rect> drawn_;
