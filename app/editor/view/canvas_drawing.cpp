@@ -33,8 +33,13 @@ void draw_wire(const Pen& pen, const Wire& w, float thickness, float alpha) {
     const glm::dvec2 lo = glm::min(glm::min(w.p[0], w.p[1]), glm::min(w.p[2], w.p[3]));
     const glm::dvec2 hi = glm::max(glm::max(w.p[0], w.p[1]), glm::max(w.p[2], w.p[3]));
     if (!pen.sees({pen.canvas.to_canvas(lo), (hi - lo) / pen.zoom})) return;
-    pen.list.AddBezierCubic(im(w.p[0]), im(w.p[1]), im(w.p[2]), im(w.p[3]),
-                            faded(w.known ? color_of(w.type) : theme().muted, alpha), thickness);
+    const ImU32 color = faded(w.known ? color_of(w.type) : theme().muted, alpha);
+    // Seen from far, a straight wire is a row of pixels: three rows that fade out are most of what hundreds of wires cost.
+    if (!pen.readable() && hi.y - lo.y < 0.5 && w.p[0].x < w.p[3].x) {
+        const float y = std::floor(float(w.p[0].y));
+        return pen.list.AddRectFilled({float(w.p[0].x), y}, {float(w.p[3].x), y + std::max(std::round(thickness), 1.f)}, color);
+    }
+    pen.list.AddBezierCubic(im(w.p[0]), im(w.p[1]), im(w.p[2]), im(w.p[3]), color, thickness);
 }
 
 void shape_curve(Wire& w) {
@@ -105,15 +110,25 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
     NodeBox box = editor.canvas.boxes[i];
     box.at += moved;
     if (!pen.sees(box)) return;
-    const ImVec2 lo = pen.at(box.at), hi = pen.at(box.at + box.size);
+    ImVec2 lo = pen.at(box.at), hi = pen.at(box.at + box.size);
     const bool near = pen.readable();
     const float round = near ? pen.px(6) : 0;
     const bool selected = editor.work.selected.count(node.id) > 0;
     const NodeStatus* status = status_of(editor, node.id);
+    const bool failed = status && status->state == NodeState::failed;
+    const ImU32 edge = selected ? t.accent : failed ? t.bad : t.border;
 
     const bool used = node.use == GraphNode::Use::normal;
     if (!used || (status && status->state == NodeState::not_asked && !status->message.empty())) pen.alpha = 0.5f;
     if (near) pen.list.AddRectFilled({lo.x + pen.px(2), lo.y + pen.px(3)}, {hi.x + pen.px(2), hi.y + pen.px(3)}, pen.color(IM_COL32(0, 0, 0, t.dark ? 70 : 28)), round);
+    // Seen from far, an edge is what a rectangle below shows of itself: fewer triangles than a line around.
+    const bool framed = !near && pen.alpha == 1;
+    if (framed) {
+        const float width = selected ? 2 : 1;
+        pen.list.AddRectFilled(lo, hi, edge);
+        lo = {lo.x + width, lo.y + width};
+        hi = {hi.x - width, hi.y - width};
+    }
     pen.list.AddRectFilled(lo, hi, pen.color(t.node), round);
     pen.list.AddRectFilled(lo, {hi.x, lo.y + pen.px(kHeaderHeight)}, pen.color(t.header), round, ImDrawFlags_RoundCornersTop);
     pen.text(box.at + glm::dvec2(12, 5), ports.type ? t.text : t.bad, node.id, kNodeWidth - 40);
@@ -142,8 +157,7 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
         pen.text({box.at.x + 12, foot + 2}, color, off ? std::string(name_of(node.use)) : footer_text(*status), kNodeWidth - 24);
     }
     draw_use(pen, node, ports, box);
-    const bool failed = status && status->state == NodeState::failed;
-    pen.list.AddRect(lo, hi, selected ? t.accent : failed ? t.bad : t.border, round, 0, selected ? std::max(pen.px(2), 1.5f) : 1.f);
+    if (!framed) pen.list.AddRect(lo, hi, edge, round, 0, selected ? std::max(pen.px(2), 1.5f) : 1.f);
 }
 
 // The whole graph, small, with what is seen of it; only where not all of it is seen.
@@ -157,7 +171,7 @@ void draw_minimap(Editor& editor) {
     for (std::size_t i = 0; i < canvas.boxes.size(); ++i) {
         const NodeStatus* status = status_of(editor, editor.work.graph().nodes[i].id);
         list.AddRectFilled(place(canvas.boxes[i].at), place(canvas.boxes[i].at + canvas.boxes[i].size),
-                           status ? faded(color_of(status->state), 0.7f) : theme().border, 1);
+                           status ? faded(color_of(status->state), 0.7f) : theme().border);
     }
     // While it is dragged, what is seen may reach beyond it.
     const glm::dvec2 seen_hi = canvas.to_canvas(canvas.lo + canvas.size);

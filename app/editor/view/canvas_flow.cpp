@@ -50,7 +50,7 @@ void draw_picture(const Pen& pen, const SmallPicture& small, const NodeBox& room
     const double height = std::min(room.size.y, room.size.x / small.thumbnail->aspect);
     const glm::dvec2 size(height * small.thumbnail->aspect, height);
     const glm::dvec2 at = room.at + (room.size - size) * 0.5;
-    pen.list.AddRectFilled(pen.at(room.at), pen.at(room.at + room.size), pen.color(IM_COL32(0, 0, 0, 255)), pen.px(3));
+    pen.list.AddRectFilled(pen.at(room.at), pen.at(room.at + room.size), pen.color(IM_COL32(0, 0, 0, 255)), pen.readable() ? pen.px(3) : 0);
     pen.list.AddImage(texture_of(small.picture), pen.at(at), pen.at(at + size), {0, 0}, {1, 1}, pen.color(IM_COL32_WHITE));
 }
 
@@ -59,7 +59,7 @@ void draw_function(const Pen& pen, const TransferFunction& f, const NodeBox& roo
     if (f.one.points.empty()) return;
     const double lo = f.one.points.front().value, hi = f.one.points.back().value;
     const int columns = pen.readable() ? 58 : 6;
-    pen.list.AddRectFilled(pen.at(room.at), pen.at(room.at + room.size), pen.color(theme().canvas), pen.px(3));
+    pen.list.AddRectFilled(pen.at(room.at), pen.at(room.at + room.size), pen.color(theme().canvas), pen.readable() ? pen.px(3) : 0);
     for (int i = 0; i < columns; ++i) {
         const Emission e = f.one.at(lo + (hi - lo) * (i + 0.5) / columns);
         const glm::dvec3 c = glm::clamp(voxloom::color_of(e), 0.0, 1.0);
