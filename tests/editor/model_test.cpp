@@ -359,6 +359,29 @@ TEST(Workspace, savingElsewhereKeepsWhatPathsName) {
     EXPECT_EQ(open_workspace(folder.path() / "a/b/g.yaml").document.text(), work.document.text());
 }
 
+TEST(Workspace, knowsWhatSavingWouldDestroy) {
+    voxloom::testing::TempFolder folder;
+    const std::filesystem::path mine = folder.path() / "mine.yaml", other = folder.path() / "other.yaml";
+    Workspace work = workspace_of(kChain);
+    EXPECT_EQ(what_saving_destroys(work, mine), "") << "nothing is there";
+    std::ofstream(other) << kChain;
+    EXPECT_NE(what_saving_destroys(work, other), "") << "never saved here";
+    save_workspace(work, mine, registry());
+    EXPECT_NE(what_saving_destroys(work, other), "");
+    EXPECT_EQ(what_saving_destroys(work, mine), "");
+    EXPECT_EQ(what_saving_destroys(work, folder.path() / "." / "mine.yaml"), "") << "the same file";
+    work.document.remove_node("add");
+    EXPECT_EQ(what_saving_destroys(work, mine), "") << "changed here alone";
+    std::ofstream(mine, std::ios::app) << "# by another\n";
+    EXPECT_NE(what_saving_destroys(work, mine), "");
+    std::ofstream(mine) << "no graph";
+    EXPECT_NE(what_saving_destroys(work, mine), "");
+    save_workspace(work, mine, registry());
+    EXPECT_EQ(what_saving_destroys(work, mine), "");
+    std::filesystem::remove(mine);
+    EXPECT_EQ(what_saving_destroys(work, mine), "") << "gone";
+}
+
 TEST(Workspace, settingsComeBack) {
     voxloom::testing::TempFolder folder;
     Settings settings;

@@ -50,6 +50,17 @@ void save_workspace(Workspace& workspace, const fs::path& file, const Registry& 
     workspace.saved_text = workspace.document.text();
 }
 
+std::string what_saving_destroys(const Workspace& workspace, const fs::path& file) {
+    std::error_code error;
+    if (!fs::exists(file, error)) return {};
+    if (workspace.file.empty() || !fs::equivalent(file, workspace.file, error)) return "There is a file of this name already.";
+    try {
+        if (Document::load(file).text() == workspace.saved_text) return {};
+    } catch (const Error&) {  // what is there now is no graph, and was one
+    }
+    return "Another program has changed the file since it was opened or saved here.";
+}
+
 void forget_missing(Workspace& workspace) {
     std::erase_if(workspace.selected, [&](const std::string& id) { return !workspace.graph().find(id); });
     workspace.selected_comments.clear();  // their numbers may be those of others now

@@ -27,6 +27,8 @@ struct Workspace {
 Workspace open_workspace(const std::filesystem::path& file);  // throws Error
 // Relative paths of files to read keep naming the same files when the graph goes to another folder.
 void save_workspace(Workspace& workspace, const std::filesystem::path& file, const Registry& registry);
+// What saving there would destroy that this workspace knows nothing of, in a sentence; empty where there is nothing.
+std::string what_saving_destroys(const Workspace& workspace, const std::filesystem::path& file);
 // Undone or removed nodes cannot stay selected.
 void forget_missing(Workspace& workspace);
 

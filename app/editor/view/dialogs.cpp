@@ -114,8 +114,8 @@ namespace {
 void go_to_folder(FileDialog& dialog, const fs::path& folder) {
     dialog.folder = folder;
     dialog.entries.clear();
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, fs::directory_options::skip_permission_denied, error)) {
+    std::error_code listing, error;
+    for (const auto& entry : fs::directory_iterator(folder, listing)) {
         const fs::path& path = entry.path();
         const bool is_folder = entry.is_directory(error);
         const bool graphs = dialog.purpose != FileDialog::Purpose::parameter;
@@ -123,6 +123,7 @@ void go_to_folder(FileDialog& dialog, const fs::path& folder) {
         if (!is_folder && graphs && path.extension() != ".yaml" && path.extension() != ".yml") continue;
         dialog.entries.push_back(is_folder ? path / "" : path);
     }
+    dialog.problem = listing ? "This folder cannot be read: " + listing.message() + "." : "";
     std::sort(dialog.entries.begin(), dialog.entries.end(), [](const fs::path& a, const fs::path& b) {
         return std::pair(a.has_filename(), a) < std::pair(b.has_filename(), b);
     });
@@ -152,6 +153,8 @@ void draw_entries(Editor& editor, std::optional<fs::path>& taken) {
         }
         mark(editor, "file:" + name);
     }
+    if (!dialog.problem.empty()) wrapped_in(theme().bad, dialog.problem);
+    else if (dialog.entries.empty()) text_in(theme().muted, dialog.purpose == FileDialog::Purpose::parameter ? "Nothing is here." : "No graph is here.");
     ImGui::EndChild();
     if (!go.empty()) go_to_folder(dialog, go);
 }
@@ -169,7 +172,7 @@ void draw_file_dialog(Editor& editor) {
     draw_entries(editor, taken);
     if (ImGui::IsWindowAppearing()) ImGui::SetKeyboardFocusHere();
     ImGui::SetNextItemWidth(-1);
-    if (ImGui::InputTextWithHint("##name", "Name, or a whole path", &dialog.name, ImGuiInputTextFlags_EnterReturnsTrue) && !dialog.name.empty())
+    if (ImGui::InputTextWithHint("##name", "Name, or a whole path", &dialog.name, ImGuiInputTextFlags_EnterReturnsTrue | ImGuiInputTextFlags_AutoSelectAll) && !dialog.name.empty())
         taken = dialog.folder / dialog.name;
     mark(editor, "file-name");
     if (ImGui::Button(dialog.purpose == FileDialog::Purpose::save_graph ? "Save" : "Open") && !dialog.name.empty()) taken = dialog.folder / dialog.name;
@@ -218,6 +221,34 @@ void draw_changes_question(Editor& editor) {
         ImGui::CloseCurrentPopup();
     }
     mark(editor, "changes:cancel");
+    ImGui::EndPopup();
+}
+
+void draw_overwriting_question(Editor& editor) {
+    if (std::exchange(editor.ask_about_overwriting, false)) ImGui::OpenPopup("overwriting");
+    const ImVec2 screen = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos({screen.x / 2, screen.y / 2}, 0, {0.5f, 0.5f});
+    if (!ImGui::BeginPopupModal("overwriting", nullptr, kNoTitle | ImGuiWindowFlags_AlwaysAutoResize)) return;
+    ImGui::TextUnformatted(editor.overwriting_destroys.c_str());
+    text_in(theme().accent, shortened(editor.overwriting.string(), ui(420), theme().body, theme().body->FontSize).c_str());
+    ImGui::Dummy({ui(420), ui(6)});
+    if (ImGui::Button("Overwrite")) {
+        ImGui::CloseCurrentPopup();
+        save_to(editor, editor.overwriting);
+    }
+    mark(editor, "overwriting:overwrite");
+    ImGui::SameLine();
+    if (ImGui::Button("Save as…")) {
+        ImGui::CloseCurrentPopup();
+        save_as(editor);
+    }
+    mark(editor, "overwriting:save-as");
+    ImGui::SameLine();
+    if (ImGui::Button("Cancel") || ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape), false)) {
+        editor.after_saving_asked = nullptr;
+        ImGui::CloseCurrentPopup();
+    }
+    mark(editor, "overwriting:cancel");
     ImGui::EndPopup();
 }
 
@@ -295,6 +326,7 @@ void open_file_dialog(Editor& editor, FileDialog::Purpose purpose, const fs::pat
 void draw_dialogs(Editor& editor) {
     draw_recovery_question(editor);
     draw_changes_question(editor);
+    draw_overwriting_question(editor);
     draw_file_dialog(editor);
     draw_problems(editor);
 }

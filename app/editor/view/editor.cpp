@@ -75,8 +75,6 @@ void begin_document(Editor& editor, Workspace work) {
     fit_canvas(editor);
 }
 
-namespace {
-
 void save_to(Editor& editor, const fs::path& file) {
     close_drag_step(editor);
     try {
@@ -88,6 +86,15 @@ void save_to(Editor& editor, const fs::path& file) {
     } catch (const Error& e) {
         say(editor, e.what(), true);
     }
+}
+
+namespace {
+
+void save_or_ask(Editor& editor, const fs::path& file) {
+    editor.overwriting_destroys = what_saving_destroys(editor.work, file);
+    if (editor.overwriting_destroys.empty()) return save_to(editor, file);
+    editor.overwriting = file;
+    editor.ask_about_overwriting = true;
 }
 
 }  // namespace
@@ -106,14 +113,14 @@ void open_graph(Editor& editor, const fs::path& file) {
 
 void save(Editor& editor) {
     if (editor.work.file.empty()) return save_as(editor);
-    save_to(editor, editor.work.file);
+    save_or_ask(editor, editor.work.file);
 }
 
 void save_as(Editor& editor) {
     open_file_dialog(editor, FileDialog::Purpose::save_graph, editor.work.file, [&editor](const fs::path& file) {
         fs::path named = file;
         if (!named.has_extension()) named += ".yaml";
-        save_to(editor, named);
+        save_or_ask(editor, named);
     });
 }
 

@@ -124,6 +124,7 @@ struct FileDialog {
     std::filesystem::path folder;
     std::string name;
     std::vector<std::filesystem::path> entries;  // of the folder; folders first
+    std::string problem;                         // why they are not known
     std::function<void(const std::filesystem::path&)> chosen;
 };
 
@@ -183,6 +184,9 @@ struct Editor {
     bool start_page = true, show_help = false, show_problems = false, show_expert = false;
     std::function<void()> after_saving_asked;  // waits for the answer about unsaved changes
     bool ask_about_changes = false;
+    std::filesystem::path overwriting;        // waits for the answer whether what is there may go
+    std::string overwriting_destroys;         // in a sentence
+    bool ask_about_overwriting = false;
     std::string id_text, id_of;               // the node's name while it is typed
     std::map<std::string, std::string> texts;  // of parameters while they are typed
     KnobList knobs;
@@ -263,6 +267,7 @@ void begin_document(Editor& editor, Workspace work);
 void new_graph(Editor& editor);
 void open_graph(Editor& editor, const std::filesystem::path& file);
 void save(Editor& editor);
+void save_to(Editor& editor, const std::filesystem::path& file);  // whatever is there
 void save_as(Editor& editor);
 // Runs f now, or after the question whether the changes are to be saved.
 void unless_changed(Editor& editor, std::function<void()> f);

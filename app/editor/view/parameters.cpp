@@ -198,12 +198,19 @@ void draw_value(const Row& row) {
     }
 }
 
+// Where it may lie. Bounds beyond all use are there for arithmetic's sake, and tell nobody anything.
+std::string range_text(const ParamSpec& spec) {
+    const bool least = spec.min > -1e100 && (spec.min == 0 || std::abs(spec.min) > 1e-100), most = spec.max < 1e100;
+    if (least && most) return fmt::format("{} to {}", shortest(spec.min), shortest(spec.max));
+    if (least) return "at least " + shortest(spec.min);
+    return most ? "at most " + shortest(spec.max) : "";
+}
+
 std::string spec_tooltip(const Row& row) {
     const ParamSpec& spec = row.spec;
     std::string text = spec.doc;
     std::vector<std::string> facts{"default " + to_yaml(spec.initial)};
-    if (std::isfinite(spec.min) || std::isfinite(spec.max))
-        facts.push_back(fmt::format("{} to {}", shortest(spec.min), shortest(spec.max)));
+    if (std::string range = range_text(spec); !range.empty()) facts.push_back(std::move(range));
     if (!spec.unit.empty()) facts.push_back("in " + spec.unit);
     if (spec.quality) facts.emplace_back("trades speed for error");
     if (spec.affects == Affects::cost) facts.emplace_back("changes the cost only, not the result");
@@ -216,7 +223,6 @@ void draw_row(Editor& editor, const std::string& id, const ParamSpec& spec) {
     Row row{editor, *node, spec, shown_value(*node, spec)};
     const Theme& t = theme();
     ImGui::PushID(spec.key.c_str());
-    ImGui::AlignTextToFramePadding();
     const float left = ImGui::GetCursorPosX();
     const float full = ImGui::GetContentRegionAvail().x, label = std::clamp(full * 0.38f, ui(90), ui(190));
     std::string title = spec.key;
@@ -224,7 +230,12 @@ void draw_row(Editor& editor, const std::string& id, const ParamSpec& spec) {
     if (!spec.unit.empty() && spec.unit.size() < 9) title += ", " + spec.unit;
     if (spec.quality) title += " ◆";
     const std::string cut = shortened(title, label - ui(8), t.body, t.body->FontSize);
-    text_in(!row.shown.problem.empty() ? t.bad : row.shown.set ? t.text : t.muted, cut.c_str());
+    // All of the room beside the value is the name's.
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    ImGui::GetWindowDrawList()->AddText({at.x, at.y + ImGui::GetStyle().FramePadding.y},
+                                        !row.shown.problem.empty() ? t.bad : row.shown.set ? t.text : t.muted, cut.c_str());
+    ImGui::InvisibleButton("name", {label - ui(8), ImGui::GetFrameHeight()});
+    mark(editor, "name:" + row.name());
     tooltip(spec_tooltip(row));
     if (ImGui::BeginPopupContextItem("more")) {
         if (ImGui::MenuItem("Reset", nullptr, false, row.shown.set)) edit(editor, [&] { editor.work.document.reset_param(id, spec.key); });

@@ -76,7 +76,7 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
         s.histogram = found.made;
         s.problem = found.problem;
     }
-    if (s.histogram) s.range = s.histogram->range;
+    if (s.histogram && s.histogram->range.extent() > 0) s.range = s.histogram->range;
     else if (s.function && s.function->one.points.size() > 1)
         s.range = {s.function->one.points.front().value, s.function->one.points.back().value};
     if (const ParamSpec* spec = type.find_param("range")) {
@@ -106,7 +106,8 @@ void draw_histogram(const Scene& s) {
         const double a = s.share(r.min + r.extent() * double(i) / double(counts.size()));
         const double b = s.share(r.min + r.extent() * double(i + 1) / double(counts.size()));
         const float left = std::max(s.place(a, 0).x, s.lo.x), right = std::min(s.place(b, 0).x, s.hi.x);
-        if (left < right) list.AddRectFilled({left, s.hi.y - float(std::log1p(counts[i]) / most) * (s.hi.y - s.lo.y)}, {right + 1, s.hi.y}, color);
+        // What is constant is one bar.
+        if (left < right || (r.extent() <= 0 && left == right)) list.AddRectFilled({left, s.hi.y - float(std::log1p(counts[i]) / most) * (s.hi.y - s.lo.y)}, {right + 1, s.hi.y}, color);
     }
 }
 

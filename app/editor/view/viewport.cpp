@@ -242,6 +242,7 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
     const bool hovered = ImGui::IsItemHovered();
 
     const std::size_t a = cell.shown.front(), b = cell.shown.back();
+    std::size_t seen = a;
     const LiveValue* other = value_at(editor, ports[b]);
     std::string why;
     Picture* picture = &view.pictures[a];
@@ -252,7 +253,7 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
         picture = &view.difference.picture;
     } else if (view.mode == Mode::flicker && other_there) {
         const double halves = std::floor(2 * ImGui::GetTime());
-        if (std::fmod(halves, 2) == 1) picture = &view.pictures[b];
+        if (std::fmod(halves, 2) == 1) seen = b, picture = &view.pictures[b];
         changes_at(editor, (halves + 1) / 2);
     }
     if (!there) return say_in(cell.lo, cell.size, why.empty() ? why_empty(editor, port) : why);
@@ -273,17 +274,21 @@ void draw_cell(Editor& editor, const Cell& cell, const std::vector<WireEnd>& por
         list.AddImage(texture_of(view.pictures[b]), im({x, lo.y}), im(hi), {float(view.wipe), 0}, {1, 1});
         list.AddLine(im({x, lo.y}), im({x, hi.y}), theme().accent, std::max(ui(1), 1.f));
     }
-    const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, port.node));
-    draw_plane_gizmo(editor, port, camera, lo, hi, hovered);
+    const WireEnd& seen_port = ports[seen];
+    const LiveValue& seen_value = seen == a ? *value : *other;
+    const Camera* camera = camera_seen(editor, camera_of(editor.work.graph(), editor.registry, seen_port.node));
+    draw_plane_gizmo(editor, seen_port, camera, lo, hi, hovered);
     std::vector<std::string> texts{view.mode == Mode::difference ? fmt::format("difference x {:.0f}", view.difference.scale)
-                                                                 : caption(editor, port, *value, picture->size)};
+                                                                 : caption(editor, seen_port, seen_value, picture->size)};
+    // Those that take turns look alike, so that it must be said which one it is.
+    if (view.mode == Mode::flicker) texts.insert(texts.begin(), seen_port.node);
     if (hovered && view.mode != Mode::difference) {
-        const ImagePtr& image = std::get<ImagePtr>(value->value);
+        const ImagePtr& image = std::get<ImagePtr>(seen_value.value);
         const glm::dvec2 at = (vec(ImGui::GetMousePos()) - lo) / (hi - lo) * glm::dvec2(image->size());
         for (std::string& part : pixel_texts(*image, at, camera)) texts.push_back(std::move(part));
-        ask_what_is_seen(editor, port, *value, image, at);
+        ask_what_is_seen(editor, seen_port, seen_value, image, at);
     }
-    draw_caption(cell.lo, cell.size, texts, value->fresh);
+    draw_caption(cell.lo, cell.size, texts, seen_value.fresh);
     list.PopClipRect();
 }
 
