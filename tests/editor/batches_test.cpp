@@ -24,9 +24,9 @@ DrawnList one_command(std::uintptr_t texture = kLetters.texture) { return {"a", 
 TEST(Batches, largeAreasOfOneColourNeedNoTexture) {
     DrawnList list = one_command();
     add_box(list, {0, 0}, {500, 500}, kSolid);
-    add_box(list, {10, 10}, {80, 80}, kClear);
+    add_box(list, {10, 10}, {100, 80}, kClear);
     add_box(list, {20, 20}, {8, 12}, kSolid, true);
-    add_box(list, {0, 0}, {50, 50}, kSolid);
+    add_box(list, {0, 0}, {50, 160}, kSolid);
     const std::vector<Batch> batches = batches_of({list}, kLetters);
     ASSERT_EQ(batches.size(), 4U);
     EXPECT_EQ(batches[0].kind, Batch::Kind::opaque);
@@ -66,7 +66,7 @@ TEST(Batches, drawEverythingOnceInOrderAndInAWayThatCan) {
         for (int c = 0; c < 5; ++c) {
             list.commands.push_back({{c, 0, 900, 900}, std::uintptr_t(7 + c % 2), 0, std::uint32_t(list.indices.size()), 0});
             for (int i = below(60); i > 0; --i)
-                add_box(list, {below(500), below(500)}, {1 + below(200), 1 + below(200)}, below(2) ? kSolid : kClear, below(3) == 0);
+                add_box(list, {below(500), below(500)}, {1 + below(300), 1 + below(300)}, below(2) ? kSolid : kClear, below(3) == 0);
         }
     const std::vector<Batch> batches = batches_of(lists, kLetters);
     auto batch = batches.begin();

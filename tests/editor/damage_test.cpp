@@ -78,6 +78,10 @@ TEST(Damage, isOneRectangleWhereManyTrianglesMove) {
     };
     EXPECT_EQ(damage(moved_by(100, 0), moved_by(101, 0), kLarge).size(), 4U);
     EXPECT_EQ(damage(moved_by(100, 10000), moved_by(101, 10000), kLarge), (std::vector<Rect>{{{99, 99}, {442, 442}}}));
+    // Those of another list are no reason: what is far from them there stays a rectangle of its own.
+    std::vector<DrawnList> before = moved_by(100, 10000), now = moved_by(101, 10000);
+    for (auto* lists : {&before, &now}) lists->push_back({"b", {}, {}, {}}), add_box(lists->back(), {1500, 800}, {1510, 810}, lists == &now, 1, {0, 0, 1600, 900});
+    EXPECT_EQ(damage(before, now, kLarge), (std::vector<Rect>{{{99, 99}, {442, 442}}, {{1499, 799}, {1511, 811}}}));
 }
 
 TEST(Damage, leavesTheRestAsItIs) {

@@ -7,7 +7,7 @@ namespace voxloom::editor {
 
 namespace {
 
-constexpr float kWorthABatch = 2000;  // pixels
+constexpr float kWorthABatch = 8000;  // pixels
 constexpr float kEdges = 16;          // pixels that a triangle touches without covering them
 
 struct Triangle {

@@ -10,7 +10,8 @@ namespace {
 
 constexpr std::size_t kMostRects = 6;
 constexpr double kMostShare = 0.75;  // of the window; then all of it is drawn
-// Pixels that are rather drawn too many than a rectangle more: for every one all triangles are handed over again.
+// Pixels that are rather drawn too many than a rectangle more, and for each of a list's triangles: for every rectangle in a
+// list all of them are drawn again.
 constexpr double kSpare = 4096, kSpareATriangle = 8;
 
 bool contains(const Rect& a, const Rect& b) { return glm::all(glm::lessThanEqual(a.lo, b.lo)) && glm::all(glm::greaterThanEqual(a.hi, b.hi)); }
@@ -98,18 +99,15 @@ bool same(const Triangles& a, std::size_t i, const Triangles& b, std::size_t k) 
     return true;
 }
 
-void add_all(const DrawnList& list, Rects& rects) {
-    const Triangles triangles(list);
-    for (std::size_t i = 0; i < triangles.size() && !rects.most(); ++i) rects.add(triangles.covers(i));
-}
-
-void compare(const DrawnList& before, const DrawnList& now, Rects& rects) {
+// What changes where `before`, which may be nothing, becomes `now`.
+Rects compare(const DrawnList& before, const DrawnList& now, glm::ivec2 size) {
     const Triangles a(before), b(now);
+    Rects rects(size, std::max(a.size(), b.size()));
     const std::size_t most = std::min(a.size(), b.size());
     if (a.size() == b.size()) {
         for (std::size_t i = 0; i < most && !rects.most(); ++i)
             if (!same(a, i, b, i)) rects.add(a.covers(i)), rects.add(b.covers(i));
-        return;
+        return rects;
     }
     // Something came or went: what is the same before and behind it.
     std::size_t first = 0, last = 0;
@@ -117,6 +115,7 @@ void compare(const DrawnList& before, const DrawnList& now, Rects& rects) {
     while (last < most - first && same(a, a.size() - 1 - last, b, b.size() - 1 - last)) ++last;
     for (std::size_t i = first; i < a.size() - last && !rects.most(); ++i) rects.add(a.covers(i));
     for (std::size_t i = first; i < b.size() - last && !rects.most(); ++i) rects.add(b.covers(i));
+    return rects;
 }
 
 }  // namespace
@@ -126,24 +125,26 @@ std::vector<Rect> damage(const std::vector<DrawnList>& before, const std::vector
     std::map<std::string, std::size_t> places;
     for (std::size_t i = 0; i < before.size(); ++i)
         if (!places.emplace(before[i].name, i).second) return everything;
-    std::size_t indices = 0;
-    for (const DrawnList& list : now) indices += list.indices.size();
-    Rects rects(size, indices / 3);
+    Rects rects(size, 0);
+    auto add = [&](const DrawnList& from, const DrawnList& to) {
+        for (const Rect& r : compare(from, to, size).take()) rects.add(r);
+    };
+    const DrawnList nothing;
     std::size_t next = 0;  // the places of what is in both must rise
     std::vector<bool> met(before.size());
     for (const DrawnList& list : now) {
         const auto found = places.find(list.name);
         if (found == places.end()) {
-            add_all(list, rects);
+            add(nothing, list);
             continue;
         }
         if (found->second < next || met[found->second]) return everything;
         met[found->second] = true;
         next = found->second + 1;
-        compare(before[found->second], list, rects);
+        add(before[found->second], list);
     }
     for (std::size_t i = 0; i < before.size(); ++i)
-        if (!met[i]) add_all(before[i], rects);
+        if (!met[i]) add(before[i], nothing);
     return rects.take();
 }
 

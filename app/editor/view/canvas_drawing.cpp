@@ -154,7 +154,7 @@ void draw_node(Pen pen, Editor& editor, std::size_t i, glm::dvec2 moved) {
         }
         const ImU32 color = status->state == NodeState::failed ? t.bad : status->state == NodeState::running ? t.accent : t.muted;
         const bool off = !used && status->state == NodeState::not_asked;
-        pen.text({box.at.x + 12, foot + 2}, color, off ? std::string(name_of(node.use)) : footer_text(*status), kNodeWidth - 24);
+        if (near) pen.text({box.at.x + 12, foot + 2}, color, off ? std::string(name_of(node.use)) : footer_text(*status), kNodeWidth - 24);
     }
     draw_use(pen, node, ports, box);
     if (!framed) pen.list.AddRect(lo, hi, edge, round, 0, selected ? std::max(pen.px(2), 1.5f) : 1.f);
