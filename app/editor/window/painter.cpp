@@ -15,13 +15,13 @@ const char* const kVertex = R"(#version 330 core
 layout(location = 0) in vec2 position;
 layout(location = 1) in vec2 texel;
 layout(location = 2) in vec4 color;
-uniform vec2 size;
+uniform vec2 scale;
 out vec2 at;
 out vec4 tint;
 void main() {
     at = texel;
     tint = color;
-    gl_Position = vec4(position * vec2(2, -2) / size + vec2(-1, 1), 0, 1);
+    gl_Position = vec4(position * scale + vec2(-1, 1), 0, 1);
 }
 )";
 const char* const kTextured = R"(#version 330 core
@@ -109,7 +109,7 @@ void Painter::load(const std::vector<DrawnList>& lists, const Letters& letters, 
     }
     for (const GLuint program : {textured_, plain_}) {
         glUseProgram(program);
-        glUniform2f(glGetUniformLocation(program, "size"), float(size.x) / scale.x, float(size.y) / scale.y);
+        glUniform2f(glGetUniformLocation(program, "scale"), 2 * scale.x / float(size.x), -2 * scale.y / float(size.y));
     }
     glBindVertexArray(0);
 }
