@@ -395,6 +395,12 @@ TEST(Workspace, settingsComeBack) {
     EXPECT_EQ(back.text_scale, 1.25);
     EXPECT_EQ(back.recent, settings.recent);
     EXPECT_EQ(back.recent.front(), folder.path() / "g 15.yaml");
+    const std::size_t count = settings.recent.size();
+    forget(settings, folder.path() / "a/../g 15.yaml");
+    EXPECT_EQ(settings.recent.size(), count - 1);
+    EXPECT_EQ(settings.recent.front(), folder.path() / "g 19.yaml");
+    forget(settings, folder.path() / "never there.yaml");
+    EXPECT_EQ(settings.recent.size(), count - 1);
     EXPECT_EQ(load_settings(folder.path() / "none").recent.size(), 0u);
 }
 

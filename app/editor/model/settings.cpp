@@ -67,10 +67,13 @@ void save_settings(const Settings& settings, const fs::path& file) {
 }
 
 void remember(Settings& settings, const fs::path& graph) {
-    const fs::path absolute = fs::absolute(graph).lexically_normal();
-    std::erase(settings.recent, absolute);
-    settings.recent.insert(settings.recent.begin(), absolute);
+    forget(settings, graph);
+    settings.recent.insert(settings.recent.begin(), fs::absolute(graph).lexically_normal());
     if (settings.recent.size() > kMostRecent) settings.recent.resize(kMostRecent);
+}
+
+void forget(Settings& settings, const fs::path& graph) {
+    std::erase(settings.recent, fs::absolute(graph).lexically_normal());
 }
 
 std::vector<Example> find_examples() {

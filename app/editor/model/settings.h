@@ -19,6 +19,7 @@ std::filesystem::path settings_file();
 Settings load_settings(const std::filesystem::path& file);
 void save_settings(const Settings& settings, const std::filesystem::path& file);
 void remember(Settings& settings, const std::filesystem::path& graph);
+void forget(Settings& settings, const std::filesystem::path& graph);
 
 struct Example {
     std::filesystem::path file;

@@ -60,7 +60,7 @@ Plot plot_of(const std::vector<Tried>& tried, ImVec2 lo, ImVec2 hi) {
 }
 
 std::string text_of(const Tried& t) {
-    std::string text = fmt::format("{}: {}, {:.4g} dB", t.codec, human_seconds(t.seconds), t.psnr);
+    std::string text = fmt::format("{}: {}, {}", t.codec, human_seconds(t.seconds), std::isfinite(t.psnr) ? fmt::format("{:.4g} dB", t.psnr) : "without error");
     for (const GraphParam& param : t.params)
         if (param.yaml.kind != GraphParam::Yaml::Kind::list) text += fmt::format("\n{}: {}", param.key, param.yaml.text);
     return text + "\nClick: back to these parameters.";

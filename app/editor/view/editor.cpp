@@ -108,6 +108,9 @@ void open_graph(Editor& editor, const fs::path& file) {
         save_settings(editor.settings, editor.settings_file);
     } catch (const Error& e) {
         say(editor, e.what(), true);
+        if (std::error_code error; fs::exists(file, error) || error) return;
+        forget(editor.settings, file);
+        save_settings(editor.settings, editor.settings_file);
     }
 }
 
@@ -360,6 +363,8 @@ void draw(Editor& editor) {
     editor.picked.clear();
     editor.evaluator.refresh(editor.live);
     handle_keys(editor);
+    // What was pasted is not to lie behind it.
+    editor.start_page = editor.start_page && editor.work.graph().nodes.empty();
 
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     const float top = ui(44), bottom = size.y - ui(28), gap = ui(5);
