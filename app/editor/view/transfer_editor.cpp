@@ -79,6 +79,9 @@ Scene scene_of(Editor& editor, const GraphNode& node, const NodeType& type) {
     if (s.histogram && s.histogram->range.extent() > 0) s.range = s.histogram->range;
     else if (s.function && s.function->one.points.size() > 1)
         s.range = {s.function->one.points.front().value, s.function->one.points.back().value};
+    // What is constant has no range of its own, but is seen beside the function.
+    if (s.histogram && s.histogram->range.extent() <= 0)
+        s.range = {std::min(s.range.min, s.histogram->range.min), std::max(s.range.max, s.histogram->range.max)};
     if (const ParamSpec* spec = type.find_param("range")) {
         const auto given = value_of(node, *spec);
         if (auto* r = std::get_if<std::vector<double>>(&given); r && r->size() == 2 && (*r)[0] < (*r)[1]) s.range = {(*r)[0], (*r)[1]};
@@ -106,8 +109,9 @@ void draw_histogram(const Scene& s) {
         const double a = s.share(r.min + r.extent() * double(i) / double(counts.size()));
         const double b = s.share(r.min + r.extent() * double(i + 1) / double(counts.size()));
         const float left = std::max(s.place(a, 0).x, s.lo.x), right = std::min(s.place(b, 0).x, s.hi.x);
-        // What is constant is one bar.
-        if (left < right || (r.extent() <= 0 && left == right)) list.AddRectFilled({left, s.hi.y - float(std::log1p(counts[i]) / most) * (s.hi.y - s.lo.y)}, {right + 1, s.hi.y}, color);
+        const bool constant = r.extent() <= 0 && left == right;  // one bar, that can be seen
+        if (left < right || constant)
+            list.AddRectFilled({left, s.hi.y - float(std::log1p(counts[i]) / most) * (s.hi.y - s.lo.y)}, {right + (constant ? ui(3) : 1), s.hi.y}, color);
     }
 }
 
