@@ -234,21 +234,19 @@ void handle_keys(Editor& editor) {
     for (const Action& a : actions()) {
         // A picture can be taken of anything.
         if ((io.WantTextInput || popup) && a.key != GLFW_KEY_F11 && a.key != GLFW_KEY_F12) continue;
-        if (io.KeyCtrl != a.ctrl || io.KeyShift != a.shift || io.KeyAlt) continue;
+        // On many keyboards + is = with Shift.
+        if (io.KeyCtrl != a.ctrl || (io.KeyShift != a.shift && a.key != GLFW_KEY_EQUAL) || io.KeyAlt) continue;
         if (!ImGui::IsKeyPressed(a.key, false)) continue;
         if (!a.possible || a.possible(editor)) a.run(editor);
         return;
     }
 }
 
-void action_button(Editor& editor, std::string_view id) {
+BarButton button_of(Editor& editor, std::string_view id, bool apart) {
     const Action& a = action(id);
-    const bool possible = !a.possible || a.possible(editor);
-    ImGui::BeginDisabled(!possible);
-    if (ImGui::Button(a.title)) a.run(editor);
-    ImGui::EndDisabled();
-    mark(editor, std::string("action:") + a.id);
-    tooltip(fmt::format("{}  ({})", a.doc, key_text(a)));
+    return {a.title, key_text(a), a.doc, std::string("action:") + a.id, !a.possible || a.possible(editor), [&editor, &a] { a.run(editor); }, apart};
 }
+
+void action_button(Editor& editor, std::string_view id) { draw_button(editor, button_of(editor, id)); }
 
 }  // namespace voxloom::editor

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "app/editor/view/editor.h"
+#include "app/editor/view/button_bar.h"
 
 namespace voxloom::editor {
 
@@ -26,6 +26,7 @@ std::string key_text(const Action& action);  // "Ctrl+Shift+S"
 // Runs what the keyboard asks for, unless a text is being typed.
 void handle_keys(Editor& editor);
 // A button with the action's title and tooltip.
+BarButton button_of(Editor& editor, std::string_view id, bool apart = false);
 void action_button(Editor& editor, std::string_view id);
 
 }  // namespace voxloom::editor

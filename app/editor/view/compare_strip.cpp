@@ -102,7 +102,7 @@ void draw_tried(Editor& editor, const std::vector<Branch>& branches, ImVec2 lo, 
     if (clicked) edit(editor, [&] { bring_back(editor.work.document, chosen, editor.registry); });
 }
 
-void draw_buttons(Editor& editor, const std::vector<Branch>& branches) {
+void draw_buttons(Editor& editor, const std::vector<Branch>& branches, float right) {
     const Action& numbers = action("numbers");
     if (ImGui::Button(editor.viewport.numbers ? "Hide numbers" : "Show numbers")) numbers.run(editor);
     mark(editor, "numbers");
@@ -118,18 +118,17 @@ void draw_buttons(Editor& editor, const std::vector<Branch>& branches) {
         mark(editor, "sweep-stop");
         return;
     }
+    std::vector<BarButton> sweeps;
     std::set<std::string> codecs;
     for (const Branch& branch : branches) {
         if (branch.codec.empty() || !codecs.insert(branch.codec).second) continue;
         const std::optional<Sweep> sweep = sweep_of(editor.work.graph(), editor.registry, branch.codec);
-        ImGui::BeginDisabled(!sweep);
-        if (ImGui::Button(("Sweep " + branch.codec).c_str())) editor.sweep = sweep, editor.viewport.numbers = true;
-        ImGui::EndDisabled();
-        mark(editor, "sweep:" + branch.codec);
-        tooltip(sweep ? fmt::format("Tries {} values of {}; the graph stays as it is.", sweep->values.size(), sweep->param)
-                      : "It has no parameter in use that trades speed for error.");
-        ImGui::SameLine();
+        const std::string doc = sweep ? fmt::format("Tries {} values of {}; the graph stays as it is.", sweep->values.size(), sweep->param)
+                                      : "It has no parameter in use that trades speed for error.";
+        sweeps.push_back({"Sweep " + branch.codec, "", doc, "sweep:" + branch.codec, sweep.has_value(),
+                          [&editor, sweep] { editor.sweep = sweep, editor.viewport.numbers = true; }});
     }
+    button_bar(editor, "more:sweeps", sweeps, right);
 }
 
 }  // namespace
@@ -146,7 +145,7 @@ void draw_compare_strip(Editor& editor, glm::dvec2 lo, glm::dvec2 size) {
     ImGui::GetWindowDrawList()->AddRectFilled(im(lo), im(lo + size), theme().panel);
     ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(2))));
     ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, ImVec2(ui(7), ui(2)));
-    draw_buttons(editor, branches);
+    draw_buttons(editor, branches, float(lo.x + size.x) - ui(8));
     ImGui::PopStyleVar();
     if (size.y < double(ui(kButtons + kLine))) return;
     const glm::dvec2 table = lo + glm::dvec2(ui(10), ui(kButtons));

@@ -349,7 +349,7 @@ void draw_help(Editor& editor) {
         {"Wheel; right or middle button", "Zooms to the pointer; moves the canvas."},
         {"Drag in empty space", "Selects what the box touches; with Shift, adds it."},
         {"The map in the corner", "Goes to what is clicked; follows the hand."},
-        {"Double click, right click", "Adds a node; on a node, shows its picture."},
+        {"Double click, right click", "Adds a node. A double click on a node shows its picture."},
         {"Drag the picture", "Turns its camera; with Shift or the middle button, moves it."},
         {"Wheel on the picture", "Zooms the camera; with Ctrl, magnifies the picture."},
         {"Pictures' list, upper right", "Compares: two, four, wiped, in turns, their difference."},

@@ -401,22 +401,18 @@ void draw(Editor& editor) {
 
 void draw_toolbar(Editor& editor) {
     const std::vector<std::vector<const char*>> groups = {
-        {"new", "open", "save"}, {"undo", "redo"}, {"add", "arrange", "fit"}, {"write", "stop"}, {"help"}};
-    for (const auto& group : groups) {
-        for (const char* id : group) {
-            action_button(editor, id);
-            ImGui::SameLine();
-        }
-        ImGui::Dummy({ui(6), 0});
-        ImGui::SameLine();
-    }
+        {"new", "open", "save", "save-as"}, {"undo", "redo"}, {"add", "arrange", "fit"}, {"write", "stop"}, {"help"}};
+    std::vector<BarButton> buttons;
+    for (const auto& group : groups)
+        for (const char* id : group) buttons.push_back(button_of(editor, id, id == group.front()));
     const std::string name = (editor.work.file.empty() ? "Untitled" : editor.work.file.filename().string()) +
                              (editor.work.changed() ? " *" : "");
-    const float left = ImGui::GetCursorPosX();
-    const float width = ImGui::CalcTextSize(name.c_str()).x;
-    ImGui::SetCursorPosX(std::max(left, ImGui::GetWindowWidth() - width - ui(14)));
+    const float end = ImGui::GetWindowWidth() - ui(14), width = std::min(ImGui::CalcTextSize(name.c_str()).x, end / 3);
+    button_bar(editor, "more:toolbar", buttons, ImGui::GetWindowPos().x + end - width - ui(16));
+    ImGui::SameLine();
+    ImGui::SetCursorPosX(end - width);
     ImGui::AlignTextToFramePadding();
-    text_in(theme().muted, name.c_str());
+    text_in(theme().muted, shortened(name, width, theme().body, theme().body->FontSize).c_str());
     tooltip(editor.work.file.empty() ? "Not saved yet." : fs::absolute(editor.work.file).lexically_normal().string());
 }
 

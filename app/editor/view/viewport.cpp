@@ -359,9 +359,7 @@ void draw_viewport(Editor& editor) {
     if (beside) ImGui::SetCursorScreenPos(im(lo + glm::dvec2(ui(8), ui(5))));
     draw_mode_choice(editor);
     ImGui::SameLine();
-    action_button(editor, "fit-picture");
-    ImGui::SameLine();
-    action_button(editor, "large");
+    button_bar(editor, "more:picture", {button_of(editor, "fit-picture"), button_of(editor, "large")}, float(lo.x + size.x) - ui(8));
     if (strip > 0) draw_compare_strip(editor, lo + glm::dvec2(0, size.y), {size.x, strip});
 }
 
