@@ -12,7 +12,7 @@
 #define VOXLOOM_VQ_NEAREST_ONCE
 namespace voxloom::vq {
 
-inline constexpr int kGroup = 32;   // codewords that are looked at together
+inline constexpr int kGroup = 64;   // codewords that are looked at together, at most
 inline constexpr int kChunk = 8;    // components after which a group may be left
 
 }  // namespace voxloom::vq
@@ -28,87 +28,66 @@ using DF = hn::CappedTag<float, 16>;
 using DI = hn::RebindToSigned<DF>;
 using VF = hn::Vec<DF>;
 constexpr std::size_t kLanes = hn::MaxLanes(DF());
-constexpr std::size_t kVectors = 2;  // of codewords at a time: with as many vectors, accumulators stay in registers
+constexpr std::size_t kVectors = 4;  // of codewords at a time: enough sums to hide how long an addition takes
+constexpr std::size_t kWidth = kVectors * kLanes;
 
-// The distance to one codeword, summed as the lanes do it.
-HWY_INLINE float distance_to(const SearchTable& table, const float* x, std::size_t word) {
-    float sum = 0;
-    for (int d = 0; d < table.dim; ++d) {
-        const float difference = table.columns[std::size_t(d) * std::size_t(table.stride) + word] - x[d];
-        sum += difference * difference;
-    }
-    return sum;
-}
+struct Best {
+    VF distance;
+    hn::Vec<DI> word;
+    VF limit;  // the smallest distance in all lanes
+};
 
-// kAtOnce vectors share the loads of the codewords. A group is left when none of its partial sums can win any more.
-template <int kAtOnce>
-HWY_INLINE void search(const SearchTable& table, const float* const* x, std::uint8_t* index, float* distance) {
+// The codewords from `first` on. They are left as soon as none of their partial sums can win any more.
+HWY_INLINE void look_at(const SearchTable& table, const float* x, std::size_t first, Best& best) {
     const DF d;
     const DI di;
     const auto stride = std::size_t(table.stride);
-    VF best[kAtOnce], limit[kAtOnce];
-    auto at = hn::Zero(di);
-    decltype(at) winner[kAtOnce];
-    for (int v = 0; v < kAtOnce; ++v) {
-        const float guess = distance_to(table, x[v], index[v]);
-        limit[v] = hn::Set(d, guess);
-        best[v] = hn::Set(d, guess);
-        winner[v] = hn::Set(di, std::int32_t(index[v]));
-    }
-    for (std::size_t first = 0; first < stride; first += kVectors * kLanes) {
-        VF sum[kAtOnce][kVectors];
-        for (int v = 0; v < kAtOnce; ++v)
-            for (std::size_t k = 0; k < kVectors; ++k) sum[v][k] = hn::Zero(d);
-        const float* column = table.columns.data() + first;
-        bool lost = false;
-        for (int c = 0; c < table.dim && !lost; c += kChunk) {
-            for (int i = c; i < c + kChunk; ++i, column += stride) {
-                const VF a = hn::LoadU(d, column), b = hn::LoadU(d, column + kLanes);
-                for (int v = 0; v < kAtOnce; ++v) {
-                    const VF own = hn::Set(d, x[v][i]);
-                    const VF da = hn::Sub(a, own), db = hn::Sub(b, own);
-                    sum[v][0] = hn::Add(sum[v][0], hn::Mul(da, da));
-                    sum[v][1] = hn::Add(sum[v][1], hn::Mul(db, db));
-                }
-            }
-            lost = true;
-            for (int v = 0; v < kAtOnce; ++v)
-                lost = lost && hn::AllTrue(d, hn::Gt(hn::Min(sum[v][0], sum[v][1]), limit[v]));
+    VF sum0 = hn::Zero(d), sum1 = sum0, sum2 = sum0, sum3 = sum0;
+    const float* column = table.columns.data() + first;
+    for (int chunk = 0; chunk < table.dim; chunk += kChunk) {
+        for (int i = chunk; i < chunk + kChunk; ++i, column += stride) {
+            const VF own = hn::Set(d, x[i]);
+            const auto add = [&](VF& sum, std::size_t k) HWY_ATTR {
+                const VF difference = hn::Sub(hn::LoadU(d, column + k * kLanes), own);
+                sum = hn::Add(sum, hn::Mul(difference, difference));
+            };
+            add(sum0, 0);
+            add(sum1, 1);
+            add(sum2, 2);
+            add(sum3, 3);
         }
-        if (lost) continue;
-        for (int v = 0; v < kAtOnce; ++v) {
-            for (std::size_t k = 0; k < kVectors; ++k) {
-                const auto here = hn::Iota(di, std::int32_t(first + k * kLanes));
-                // Of equal ones the first, also where the guess is a later one.
-                const auto better = hn::Or(hn::Lt(sum[v][k], best[v]),
-                                           hn::And(hn::Eq(sum[v][k], best[v]), hn::RebindMask(d, hn::Lt(here, winner[v]))));
-                best[v] = hn::IfThenElse(better, sum[v][k], best[v]);
-                winner[v] = hn::IfThenElse(hn::RebindMask(di, better), here, winner[v]);
-            }
-            limit[v] = hn::MinOfLanes(d, best[v]);
-        }
+        if (hn::AllTrue(d, hn::Gt(hn::Min(hn::Min(sum0, sum1), hn::Min(sum2, sum3)), best.limit))) return;
     }
-    for (int v = 0; v < kAtOnce; ++v) {
-        const auto least = hn::MinOfLanes(d, best[v]);
-        const auto none = hn::Set(di, kMostCodewords);
-        const auto candidates = hn::IfThenElse(hn::RebindMask(di, hn::Eq(best[v], least)), winner[v], none);
-        distance[v] = hn::GetLane(least);
-        index[v] = std::uint8_t(hn::GetLane(hn::MinOfLanes(di, candidates)));
-    }
+    const auto compare = [&](VF sum, std::size_t k) HWY_ATTR {
+        const auto word = hn::Iota(di, std::int32_t(first + k * kLanes));
+        // Of equal ones the first, though the search does not begin with the first ones.
+        const auto is_better = hn::Or(hn::Lt(sum, best.distance),
+                                      hn::And(hn::Eq(sum, best.distance), hn::RebindMask(d, hn::Lt(word, best.word))));
+        best.distance = hn::IfThenElse(is_better, sum, best.distance);
+        best.word = hn::IfThenElse(hn::RebindMask(di, is_better), word, best.word);
+    };
+    compare(sum0, 0);
+    compare(sum1, 1);
+    compare(sum2, 2);
+    compare(sum3, 3);
+    best.limit = hn::MinOfLanes(d, best.distance);
 }
 
 void FindNearest(const SearchTable& table, const float* vectors, std::size_t count, std::uint8_t* index, float* distance) {
-    constexpr int kAtOnce = 4;
-    const auto dim = std::size_t(table.dim);
-    std::size_t i = 0;
-    for (; i + kAtOnce <= count; i += kAtOnce) {
-        const float* x[kAtOnce];
-        for (std::size_t v = 0; v < kAtOnce; ++v) x[v] = vectors + (i + v) * dim;
-        search<kAtOnce>(table, x, index + i, distance + i);
-    }
-    for (; i < count; ++i) {
-        const float* x[1] = {vectors + i * dim};
-        search<1>(table, x, index + i, distance + i);
+    const DF d;
+    const DI di;
+    const std::size_t groups = std::size_t(table.stride) / kWidth;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float* x = vectors + i * std::size_t(table.dim);
+        const std::size_t home = index[i] / kWidth;  // where the guess is
+        const auto none = hn::Set(di, kMostCodewords);
+        Best best{hn::Inf(d), none, hn::Inf(d)};
+        look_at(table, x, home * kWidth, best);
+        for (std::size_t group = 0; group < groups; ++group)
+            if (group != home) look_at(table, x, group * kWidth, best);
+        const auto candidates = hn::IfThenElse(hn::RebindMask(di, hn::Eq(best.distance, best.limit)), best.word, none);
+        distance[i] = hn::GetLane(best.limit);
+        index[i] = std::uint8_t(hn::GetLane(hn::MinOfLanes(di, candidates)));
     }
 }
 
