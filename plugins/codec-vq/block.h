@@ -49,6 +49,21 @@ Block<T> read_block(const Channel<const T>& from, Index3 block) {
     return values;
 }
 
+// The reverse; what is beyond the end is dropped.
+template <class T>
+void write_block(const Channel<T>& to, Index3 block, const Block<T>& values) {
+    const Index3 lo = block * Index3(kSide), n = glm::min(Index3(kSide), to.dims - lo);
+    const T* from = values.data();
+    if (n == Index3(kSide) && to.components == 1) {
+        for (int z = 0; z < kSide; ++z)
+            for (int y = 0; y < kSide; ++y, from += kSide) std::copy_n(from, kSide, &to.at(lo.x, lo.y + y, lo.z + z));
+        return;
+    }
+    for (std::int64_t z = 0; z < n.z; ++z)
+        for (std::int64_t y = 0; y < n.y; ++y)
+            for (std::int64_t x = 0; x < n.x; ++x) to.at(lo.x + x, lo.y + y, lo.z + z) = from[(z * kSide + y) * kSide + x];
+}
+
 template <class T>
 bool all_finite(const Block<T>& values) {
     if constexpr (std::is_floating_point_v<T>)

@@ -127,27 +127,21 @@ struct Limits {
     }
 };
 
-// `octants` and `differences` are codewords; a row is complete everywhere but at the end of the brick.
+// `octants` and `differences` are codewords.
 template <class T>
-void decode_block(const Channel<T>& to, Index3 block, T mean, const float* octants, const float* differences, Real<T> unit,
-                  const Limits<T>& limits) {
-    const Index3 lo = block * Index3(kSide), hi = glm::min(lo + Index3(kSide), to.dims);
-    const bool whole = hi.x - lo.x == kSide && to.components == 1;
-    for (std::int64_t z = lo.z; z < hi.z; ++z)
-        for (std::int64_t y = lo.y; y < hi.y; ++y) {
-            const std::int64_t row = (z - lo.z) * 4 + (y - lo.y);
-            const float* own = differences + row * kSide;
-            const float* pair = octants + ((z - lo.z) >> 1) * 4 + ((y - lo.y) >> 1) * 2;
-            const auto value = [&](int x) {
-                return limits.value(Real<T>(mean) + unit * (Real<T>(pair[x >> 1]) + Real<T>(own[x])));
-            };
-            if (whole) {
-                T* out = &to.at(lo.x, y, z);
-                for (int x = 0; x < kSide; ++x) out[x] = value(x);
-            } else {
-                for (std::int64_t x = lo.x; x < hi.x; ++x) to.at(x, y, z) = value(int(x - lo.x));
-            }
-        }
+Block<T> decode_block(T mean, const float* octants, const float* differences, Real<T> unit, const Limits<T>& limits) {
+    Block<T> values;
+    const auto sum = [&](int row, int x) { return Real<T>(octants[octant_of(row) + x / 2]) + Real<T>(differences[row + x]); };
+    if constexpr (sizeof(T) <= 2) {  // in two steps, each of which the compiler makes vectors of
+        std::array<Real<T>, kVoxels> sums;
+        for (int row = 0; row < kVoxels; row += kSide)
+            for (int x = 0; x < kSide; ++x) sums[std::size_t(row + x)] = sum(row, x);
+        for (std::size_t i = 0; i < kVoxels; ++i) values[i] = limits.value(Real<T>(mean) + unit * sums[i]);
+    } else {
+        for (int row = 0; row < kVoxels; row += kSide)
+            for (int x = 0; x < kSide; ++x) values[std::size_t(row + x)] = limits.value(Real<T>(mean) + unit * sum(row, x));
+    }
+    return values;
 }
 
 template <class T>
@@ -177,8 +171,8 @@ void decode(const BrickForm& form, std::span<const Codebooks> books, std::span<c
         require_words(octants, own.octants);
         require_words(differences, own.voxels);
         for_each_block(form.dims, [&](Index3 block, std::size_t i) {
-            decode_block(to, block, load<T>(means, i), own.octants.word(int(octants[i])).data(),
-                         own.voxels.word(int(differences[i])).data(), Real<T>(form.unit), limits);
+            write_block(to, block, decode_block(load<T>(means, i), own.octants.word(int(octants[i])).data(),
+                                                own.voxels.word(int(differences[i])).data(), Real<T>(form.unit), limits));
         });
     }
     const Index3 n = blocks_of(form.dims);
@@ -189,13 +183,10 @@ void decode(const BrickForm& form, std::span<const Codebooks> books, std::span<c
             const std::uint64_t step = reader.varint();
             if (step >= count - block) fail("it keeps a block that is not there");
             block += step;
-            const auto values = reader.bytes(kVoxels * sizeof(T));
+            Block<T> values;
+            std::ranges::copy(reader.bytes(sizeof values), std::as_writable_bytes(std::span(values)).begin());
             const auto i = std::int64_t(block);
-            const Index3 lo = Index3(i % n.x, i / n.x % n.y, i / (n.x * n.y)) * Index3(kSide);
-            for (int v = 0; v < kVoxels; ++v) {
-                const Index3 at = lo + Index3(v & 3, v >> 2 & 3, v >> 4);
-                if (glm::all(glm::lessThan(at, form.dims))) to.at(at.x, at.y, at.z) = load<T>(values, std::size_t(v));
-            }
+            write_block(to, Index3(i % n.x, i / n.x % n.y, i / (n.x * n.y)), values);
         }
     }
     if (reader.left() > 0) fail("it is longer than it should be");
