@@ -69,7 +69,8 @@ def run(build, volume, crop):
 
 
 def line_of(name, r):
-    return (f"| {name} | {r['bpv']:.4f} | {r['psnr']:.2f} | {r['max_error']:.4g} | {r['seconds']:.2f} "
+    psnr = "∞" if r["psnr"] is None else f"{r['psnr']:.2f}"
+    return (f"| {name} | {r['bpv']:.4f} | {psnr} | {r['max_error']:.4g} | {r['seconds']:.2f} "
             f"| {r['decode_mvoxel_s']:.0f} |")
 
 
@@ -97,7 +98,8 @@ def write(results, command, folder):
         for peer in ("wavelet", "zfp"):
             for r in groups[peer]:
                 rows.append((peer, r))
-                panels[name].setdefault(peer, []).append((r["bpv"], r["psnr"]))
+                if r["psnr"] is not None:
+                    panels[name].setdefault(peer, []).append((r["bpv"], r["psnr"]))
         lines += table("codec", rows)
         lines += ["", "Sweeps at the most, one macroblock, 256 codewords, closed loop:", ""]
         lines += table("sweeps", [(r["parameters"]["sweeps"], r) for r in groups["sweeps"]])
