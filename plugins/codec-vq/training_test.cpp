@@ -168,7 +168,7 @@ TEST(Splits, OfALineAreIntervalsOfIt) {
 TEST(Training, NeverMakesTheDistortionLarger) {
     for (const int dim : {8, 64})
         for (const int codewords : {2, 16, 100}) {
-            const Sample sample = clouds(dim, 3000);
+            const Sample sample = clouds(dim, 1000);
             const Training training = train(sample, {codewords, 20, 1e-3});
             EXPECT_EQ(training.book.count(), codewords);
             ASSERT_GE(training.distortion.size(), 2u);
