@@ -42,15 +42,15 @@ TEST(InputQueue, whatIsDoneWithTheMouseIsDoneWhereItWas) {
     EXPECT_EQ(sizes(queue), (std::vector<std::size_t>{3, 2, 1}));
     add(queue, {button(0, true), button(0, false), button(0, true)});
     EXPECT_EQ(sizes(queue), (std::vector<std::size_t>{1, 1, 1}));
-    add(queue, {wheel(1), wheel(1), pointer(3, 3), wheel(1)});
-    EXPECT_EQ(sizes(queue), (std::vector<std::size_t>{2, 2}));
+    add(queue, {wheel(1), button(0, true), wheel(1), wheel(1)});
+    EXPECT_EQ(sizes(queue), (std::vector<std::size_t>{1, 1, 2}));
     add(queue, {key(341, true), button(0, true), key(341, false), button(0, false)});
     EXPECT_EQ(sizes(queue), (std::vector<std::size_t>{2, 1, 1})) << "the modifier belongs to the click";
 }
 
-TEST(InputQueue, pointersAreNeverBehind) {
+TEST(InputQueue, movesAndTurnsOfTheWheelAreNeverBehind) {
     InputQueue queue;
-    for (int i = 0; i < 1000; ++i) queue.add(pointer(i, 0));
+    for (int i = 0; i < 1000; ++i) add(queue, {wheel(1), pointer(i, 0)});
     const auto frame = queue.next_frame();
     EXPECT_TRUE(queue.empty());
     EXPECT_EQ(frame.back().at.x, 999);

@@ -627,6 +627,30 @@ TEST_F(Window, aPointerThatRestsIsToldWhatItRestsOn) {
     editor.wait_for("no tooltip", [](const json& s) { return !s["items"].contains("tooltip"); });
 }
 
+// However long the button was held, and nothing happens behind it.
+TEST_F(Window, aQuestionIsDrawnToItsEndBeforeTheWindowRests) {
+    VirtualDisplay display(1280, 720);
+    EditorProcess editor(display, folder.path() / "e", {graph().string(), "--size", "1280x720"});
+    editor.idle();
+    editor.click("node:tf");
+    editor.key("Delete");
+    editor.wait_for("a change", [](const json& s) { return s["changed"].get<bool>(); });
+    for (int hold = 0; hold < 8; ++hold) {
+        editor.move_to("action:new");
+        editor.press();
+        usleep(useconds_t(hold) * 23000);
+        editor.release();
+        editor.with("changes:cancel");
+        editor.wait_for("rest", [](const json& s) { return s["resting"].get<bool>(); });
+        const std::string at_rest = display.screen();
+        usleep(600000);
+        EXPECT_TRUE(at_rest == display.screen()) << hold;
+        if (hold == 7) keep(editor.screenshot(), "question");
+        editor.click("changes:cancel");
+        editor.wait_for("no question", [](const json& s) { return !s["items"].contains("changes:cancel"); });
+    }
+}
+
 // Only what changes is drawn and brought to the screen; what many changes leave there is what one drawing of everything does.
 TEST_F(Window, theScreenThatIsDrawnInPartsIsTheOneThatIsDrawnAsAWhole) {
     std::string text = kGraph;

@@ -32,6 +32,13 @@ std::string content_of(const fs::path& file) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
+// Where one of them cannot be asked it is not.
+bool is_newer(const fs::path& file, const fs::path& other) {
+    std::error_code error, other_error;
+    const auto time = fs::last_write_time(file, error), other_time = fs::last_write_time(other, other_error);
+    return !error && !other_error && time > other_time;
+}
+
 }  // namespace
 
 fs::path autosave_folder() {
@@ -88,7 +95,8 @@ std::vector<Recovered> find_recoverable(const fs::path& folder) {
             Workspace& work = recovered.workspace;
             work.file = text.substr(kHead.size(), line - kHead.size());
             work.document = Document::parse(text.substr(line + 1), work.file);
-            if (!work.file.empty()) work.saved_text = content_of(work.file);
+            // Of a file that was written after that nobody here has seen what it holds: saving asks.
+            if (!work.file.empty() && !is_newer(work.file, entry.path())) work.saved_text = content_of(work.file);
             found.push_back(std::move(recovered));
         } catch (const Error&) {
             std::error_code ignored;

@@ -16,8 +16,9 @@ bool go_together(const std::vector<InputEvent>& before, const InputEvent& next) 
             case Kind::text: return false;  // comes behind its key
             case Kind::key: return b.kind == Kind::button || same_key || (b.kind == Kind::key && b.down);
             case Kind::button: return (b.kind == Kind::button && b.code == next.code) || b.kind == Kind::wheel || (b.kind == Kind::key && !b.down);
-            case Kind::wheel: return b.kind == Kind::button || b.kind == Kind::key;
-            case Kind::pointer: return b.kind != Kind::pointer;
+            // Of a wheel that turns while the pointer moves frames are not to lag behind.
+            case Kind::wheel:
+            case Kind::pointer: return b.kind == Kind::button || b.kind == Kind::key;
         }
         return false;
     });

@@ -44,8 +44,10 @@ Workspace open_workspace(const fs::path& file) {
 
 void save_workspace(Workspace& workspace, const fs::path& file, const Registry& registry) {
     const fs::path folder = fs::absolute(file).lexically_normal().parent_path();
-    move_paths(workspace.document, workspace.graph().folder(), folder, registry);
-    workspace.document.save(file);
+    Document moved = workspace.document;  // what cannot be saved stays as it is
+    move_paths(moved, workspace.graph().folder(), folder, registry);
+    moved.save(file);
+    workspace.document = std::move(moved);
     workspace.file = file;
     workspace.saved_text = workspace.document.text();
 }

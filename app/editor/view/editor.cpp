@@ -84,6 +84,7 @@ void save_to(Editor& editor, const fs::path& file) {
         say(editor, "Saved " + file.string());
         if (auto next = std::exchange(editor.after_saving_asked, nullptr)) next();
     } catch (const Error& e) {
+        editor.after_saving_asked = nullptr;
         say(editor, e.what(), true);
     }
 }
@@ -257,7 +258,7 @@ bool is_measured(const Editor& editor, const Sweep& sweep) {
 void go_on_with_sweep(Editor& editor) {
     Sweep& sweep = *editor.sweep;
     if (editor.viewport.mode == Viewport::Mode::single || !same_results(editor.submitted, editor.work.graph())) return editor.sweep.reset();
-    if (editor.live.busy || !is_measured(editor, sweep)) return;
+    if (editor.live.busy || (sweep.next > 0 && !is_measured(editor, sweep))) return;
     if (sweep.next < sweep.values.size()) return submit(editor, graph_with(editor.work.graph(), sweep, sweep.next++), false, false);
     editor.sweep.reset();
 }

@@ -11,33 +11,35 @@ namespace voxloom::editor {
 
 using Kind = InputEvent::Kind;
 
-namespace {
-
-Input& input_of(GLFWwindow* window) { return *static_cast<Input*>(glfwGetWindowUserPointer(window)); }
-
-}  // namespace
+Input& Input::of(GLFWwindow* window) {
+    Input& input = *static_cast<Input*>(glfwGetWindowUserPointer(window));
+    input.happened_ = true;
+    return input;
+}
 
 Input::Input(GLFWwindow* window) : window_(window) {
     glfwSetWindowUserPointer(window, this);
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { input_of(w).queue_.add({.kind = Kind::pointer, .at = {x, y}}); });
-    glfwSetScrollCallback(window, [](GLFWwindow* w, double x, double y) { input_of(w).queue_.add({.kind = Kind::wheel, .at = {x, y}}); });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) { of(w).queue_.add({.kind = Kind::pointer, .at = {x, y}}); });
+    glfwSetScrollCallback(window, [](GLFWwindow* w, double x, double y) { of(w).queue_.add({.kind = Kind::wheel, .at = {x, y}}); });
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
-        input_of(w).queue_.add({.kind = Kind::button, .code = button, .down = action != GLFW_RELEASE});
+        of(w).queue_.add({.kind = Kind::button, .code = button, .down = action != GLFW_RELEASE});
     });
     // A key's text comes right behind it, and again whenever the key repeats.
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-        Input& input = input_of(w);
+        Input& input = of(w);
         input.key_ = action == GLFW_RELEASE ? -1 : key;
         input.repeated_ = action == GLFW_REPEAT;
         if (action != GLFW_REPEAT) input.queue_.add({.kind = Kind::key, .code = key, .down = action == GLFW_PRESS});
     });
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned character) {
-        Input& input = input_of(w);
+        Input& input = of(w);
         input.queue_.add({.kind = Kind::text, .code = int(character), .typed_by = input.key_, .repeated = input.repeated_});
     });
-    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { input_of(w).exposed_ = true; });
-    glfwSetWindowFocusCallback(window, ImGui_ImplGlfw_WindowFocusCallback);
-    glfwSetCursorEnterCallback(window, ImGui_ImplGlfw_CursorEnterCallback);
+    glfwSetWindowRefreshCallback(window, [](GLFWwindow* w) { of(w).exposed_ = true; });
+    glfwSetWindowFocusCallback(window, [](GLFWwindow* w, int focused) { of(w), ImGui_ImplGlfw_WindowFocusCallback(w, focused); });
+    glfwSetCursorEnterCallback(window, [](GLFWwindow* w, int entered) { of(w), ImGui_ImplGlfw_CursorEnterCallback(w, entered); });
+    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { of(w); });
+    glfwSetWindowCloseCallback(window, [](GLFWwindow* w) { of(w); });
 }
 
 void Input::give_to_frame() {
@@ -53,9 +55,11 @@ void Input::give_to_frame() {
     if (pointer_ && ImGui::IsMousePosValid(&io.MousePos)) io.MousePos = {float(pointer_->x), float(pointer_->y)};
 }
 
-void Input::look_for_popups() {
+bool Input::look_for_popups() {
     const bool there = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopupId | ImGuiPopupFlags_AnyPopupLevel);
-    if (!std::exchange(popup_, there) && there) queue_.wait_for_texts();
+    const bool changed = std::exchange(popup_, there) != there;
+    if (changed && there) queue_.wait_for_texts();
+    return changed;
 }
 
 }  // namespace voxloom::editor

@@ -19,20 +19,22 @@ class Input {
 
     // Between the back end's new frame, which would ask how things are by now, and ImGui's.
     void give_to_frame();
-    // Behind ImGui's frame: whether something came up that is typed into.
-    void look_for_popups();
+    // Behind ImGui's frame: whether something to type into or to answer has come up or gone.
+    bool look_for_popups();
     // More has come than one frame can be told.
     bool waits() const { return !queue_.empty(); }
-    // Whether the system has thrown away what the window showed, since this was asked last.
+    // Since this was asked last: whether anything has come, and whether the system has thrown away what the window showed.
+    bool take_happened() { return std::exchange(happened_, false); }
     bool take_exposed() { return std::exchange(exposed_, false); }
 
   private:
+    static Input& of(GLFWwindow* window);  // that something has happened to
     GLFWwindow* window_;
     InputQueue queue_;
     std::optional<glm::dvec2> pointer_;  // none before it moved
     std::set<int> buttons_;              // that are down
     int key_ = -1;                       // that was pressed or repeated last
-    bool repeated_ = false, popup_ = false, exposed_ = false;
+    bool repeated_ = false, popup_ = false, happened_ = false, exposed_ = false;
 };
 
 }  // namespace voxloom::editor

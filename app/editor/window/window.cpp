@@ -8,7 +8,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <ctime>
 #include <memory>
 #include <utility>
@@ -26,8 +28,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// After an event a few frames more are drawn: what it changed may change what the next one shows.
-constexpr int kFramesAfterEvent = 3;
+// After an event a few frames more are drawn: what it changed may change what the next one shows. Where a question comes up or
+// goes, what is behind it fades.
+constexpr int kFramesAfterEvent = 3, kFramesOfFading = 15;
 constexpr double kFrameSeconds = 1.0 / 60;
 
 std::string last_glfw_error() {
@@ -164,7 +167,6 @@ bool draw_frame(Editor& editor, GLFWwindow* window, Input& input, KeptFrame& kep
     input.give_to_frame();
     ImGui::NewFrame();
     draw(editor);
-    input.look_for_popups();
     ImGui::Render();
     glm::ivec2 size;
     glfwGetFramebufferSize(window, &size.x, &size.y);
@@ -183,8 +185,9 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
     Window window(arguments);
     Input input(window.get());
     KeptFrame kept(window.get());
+    std::atomic<bool> woken{false};
     // Editors hold textures of the window's context, so they end before it.
-    Editor editor(registry, settings_file(), [] { glfwPostEmptyEvent(); });
+    Editor editor(registry, settings_file(), [&woken] { woken = true, glfwPostEmptyEvent(); });
     editor.output_folder = arguments.out;
     editor.marks_wanted = !arguments.screen.empty();
     float screen_scale = 1, ignored = 1;
@@ -200,14 +203,14 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
 
     const std::stop_callback wake_to_stop(arguments.stop, [] { glfwPostEmptyEvent(); });
     double begun = glfwGetTime();
+    bool held = false;  // what is under the hand, or moves by itself, is drawn again and again
     for (int frames = kFramesAfterEvent; !editor.quit && !arguments.stop.stop_requested();) {
-        const bool held = ImGui::IsAnyMouseDown() || editor.moving;
-        const double rest = seconds_to_change(editor, begun);
-        if (frames > 0 || held || input.waits() || rest <= 0)
-            glfwPollEvents();
-        else
-            glfwWaitEventsTimeout(rest);
-        frames = frames > 0 ? frames - 1 : kFramesAfterEvent;
+        // Software renderers do not wait for the screen.
+        const bool sleeps = frames == 0 && !held && !input.waits();
+        const double rest = sleeps ? seconds_to_change(editor, begun) : input.waits() ? 0 : begun + kFrameSeconds - glfwGetTime();
+        rest > 0 ? glfwWaitEventsTimeout(rest) : glfwPollEvents();
+        const bool happened = input.take_happened() || woken.exchange(false) || input.waits();
+        frames = sleeps || held || happened ? std::max(frames, kFramesAfterEvent) : frames - 1;
         if (glfwWindowShouldClose(window.get())) {
             glfwSetWindowShouldClose(window.get(), GLFW_FALSE);
             unless_changed(editor, [&editor] { editor.quit = true; });
@@ -220,10 +223,10 @@ int run_window(const EditArguments& arguments, const Registry& registry) {
             kept.forget();
         }
         if (draw_frame(editor, window.get(), input, kept)) remember_frame(editor, glfwGetTime() - begun, thread_cpu_seconds() - cpu_begun);
-        if (!arguments.screen.empty()) write_screen(editor, frames == 0 && !input.waits(), arguments.screen);
-        // Software renderers do not wait for the screen.
-        if (const double spare = kFrameSeconds - (glfwGetTime() - begun); (frames > 0 || held) && !input.waits() && spare > 0)
-            glfwWaitEventsTimeout(spare);
+        if (input.look_for_popups()) frames = kFramesOfFading;
+        held = ImGui::IsAnyMouseDown() || editor.moving;
+        const bool resting = frames == 0 && !held && !input.waits() && std::isinf(editor.next_change);
+        if (!arguments.screen.empty()) write_screen(editor, resting, arguments.screen);
     }
     delete_textures(editor);
     check_stop(arguments.stop);
