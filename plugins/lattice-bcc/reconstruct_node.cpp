@@ -114,6 +114,7 @@ void fill(const Samples<T>& samples, Kernel kernel, const glm::dmat4& to_a, cons
 }
 
 void evaluate_reconstruct(Evaluation& e) {
+    check_stop(e.stop());
     const LatticePtr lattice = e.input<Lattice>("lattice");
     const VolumePtr like = e.input<Volume>("like");
     const VolumeDesc& a = *lattice->desc().grids[0].grid.volume();

@@ -20,6 +20,9 @@ double apply(const Taps& taps, const double* line, std::int64_t stride) {
     return sum;
 }
 
+// Room for so many numbers, which hold nothing yet.
+Buffer numbers(std::uint64_t count) { return Buffer(checked_product({std::int64_t(count), 1, 1}, sizeof(double), "a lattice"), "lattice"); }
+
 // One of the two grids, where it lies in the volume.
 struct Grid {
     Index3 dims{0};
@@ -39,6 +42,7 @@ class Resampler {
         : volume_(volume), options_(options), stop_(stop), progress_(progress) {}
 
     LatticePtr run() {
+        check_stop(stop_);
         LatticeDesc desc = lattice_desc(volume_.desc(), options_.step, options_.type);
         const int components = volume_.desc().components;
         steps_ = 2 * components;
@@ -46,12 +50,12 @@ class Resampler {
         for (std::size_t g = 0; g < 2; ++g) {
             VolumeDesc& form = std::get<VolumeDesc>(desc.grids[g].grid.detail);
             const Grid grid{form.dims, g == 0 ? 0 : 0.5 * options_.step, options_.step};
-            std::vector<double> all(std::size_t(form.voxels()) * std::size_t(components));
+            Buffer all = numbers(form.voxels() * std::uint64_t(components));
             for (int c = 0; c < components; ++c) {
-                const std::vector<double> one = sites(grid, c);
-                for (std::size_t i = 0; i < one.size(); ++i) all[i * std::size_t(components) + std::size_t(c)] = one[i];
+                const Buffer one = sites(grid, c);
+                for (std::size_t i = 0; i < form.voxels(); ++i) all.as<double>()[i * std::size_t(components) + std::size_t(c)] = one.as<double>()[i];
             }
-            const auto volume = dense(form, std::move(all));
+            const auto volume = dense(form, all.as<double>());
             form = volume->desc();
             grids.emplace_back(VolumePtr(volume));
         }
@@ -59,31 +63,33 @@ class Resampler {
     }
 
   private:
-    std::vector<double> sites(const Grid& grid, int component) {
+    Buffer sites(const Grid& grid, int component) {
         const double begin = double(done_++) / steps_;
         if (!options_.filter) return closed_form(grid, begin);
         if (!some_invalid_) {
-            std::vector<double> values = filtered(grid, component, *options_.filter, Read::values, begin);
+            Buffer values = filtered(grid, component, *options_.filter, Read::values, begin);
             if (!some_invalid_) return values;
         }
-        std::vector<double> values = filtered(grid, component, *options_.filter == Filter::linear ? Filter::linear : Filter::catmull_rom, Read::valid_values, begin);
-        const std::vector<double> touched = filtered(grid, component, Filter::catmull_rom, Read::invalidity, begin);
-        const std::vector<double> sum = filtered(grid, component, Filter::linear, Read::valid_values, begin);
-        const std::vector<double> weight = filtered(grid, component, Filter::linear, Read::validity, begin);
-        for (std::size_t i = 0; i < values.size(); ++i)
-            if (touched[i] > 0) values[i] = weight[i] > 1e-12 ? sum[i] / weight[i] : kNaN;
+        Buffer values = filtered(grid, component, *options_.filter == Filter::linear ? Filter::linear : Filter::catmull_rom, Read::valid_values, begin);
+        const Buffer touched = filtered(grid, component, Filter::catmull_rom, Read::invalidity, begin);
+        const Buffer sum = filtered(grid, component, Filter::linear, Read::valid_values, begin);
+        const Buffer weight = filtered(grid, component, Filter::linear, Read::validity, begin);
+        for (std::size_t i = 0; i < values.as<double>().size(); ++i) {
+            const double w = weight.as<double>()[i];
+            if (touched.as<double>()[i] > 0) values.as<double>()[i] = w > 1e-12 ? sum.as<double>()[i] / w : kNaN;
+        }
         return values;
     }
 
-    std::vector<double> closed_form(const Grid& grid, double begin) {
+    Buffer closed_form(const Grid& grid, double begin) {
         const ClosedForm* form = volume_.closed_form();
         if (!form) fail("this volume has no closed form; take another filter");
         if (volume_.desc().components != 1) fail("a closed form has one component, and this volume {}", volume_.desc().components);
-        std::vector<double> values(std::size_t(Box::of(grid.dims).voxels()));
+        Buffer values = numbers(Box::of(grid.dims).voxels());
         std::atomic<std::int64_t> slices{0};
         parallel_for(0, grid.dims.z, 1, [&](std::int64_t lo, std::int64_t hi) {
             for (std::int64_t z = lo; z < hi; ++z) {
-                auto* out = values.data() + z * grid.dims.y * grid.dims.x;
+                double* out = values.as<double>().data() + z * grid.dims.y * grid.dims.x;
                 for (std::int64_t y = 0; y < grid.dims.y; ++y)
                     for (std::int64_t x = 0; x < grid.dims.x; ++x) {
                         const glm::dvec3 at = grid.first + grid.step * glm::dvec3(double(x), double(y), double(z));
@@ -96,11 +102,12 @@ class Resampler {
     }
 
     // Along x and y slice by slice as they are read, then along z.
-    std::vector<double> filtered(const Grid& grid, int component, Filter filter, Read what, double begin) {
+    Buffer filtered(const Grid& grid, int component, Filter filter, Read what, double begin) {
         const Index3 n = volume_.desc().dims;
         const auto across = grid.taps(filter, 0, n.x), down = grid.taps(filter, 1, n.y), deep = grid.taps(filter, 2, n.z);
         const std::int64_t slice = grid.dims.x * grid.dims.y;
-        std::vector<double> slices(std::size_t(slice * n.z)), values(std::size_t(slice * grid.dims.z));
+        Buffer between = numbers(std::uint64_t(slice * n.z)), result = numbers(std::uint64_t(slice * grid.dims.z));
+        const std::span<double> slices = between.as<double>(), values = result.as<double>();
         const bool touches = what == Read::invalidity;  // adds up what a footprint meets, whatever the weights
         std::atomic<std::int64_t> read{0};
         parallel_for(0, n.z, 1, [&](std::int64_t lo, std::int64_t hi) {
@@ -129,7 +136,7 @@ class Resampler {
                 for (std::int64_t z = 0; z < grid.dims.z; ++z) values[std::size_t(z * slice + i)] = along(touches, deep[std::size_t(z)], line.data(), 1);
             }
         }, stop_);
-        return values;
+        return result;
     }
 
     static double along(bool touches, const Taps& taps, const double* line, std::int64_t stride) {
@@ -157,7 +164,7 @@ class Resampler {
         }
     }
 
-    std::shared_ptr<const DenseVolume> dense(VolumeDesc form, std::vector<double> values) {
+    std::shared_ptr<const DenseVolume> dense(VolumeDesc form, std::span<const double> values) {
         const std::size_t components = std::size_t(form.components);
         Buffer mask;
         if (form.has_mask) {
