@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -30,7 +29,7 @@ LatticeDesc lattice_desc(const VolumeDesc& volume, double step, ScalarType type)
         VolumeDesc desc = volume;
         desc.dims = grid == 0 ? dims.a : dims.b;
         desc.type = type;
-        if (type != volume.type) desc.significant_bits = 0;
+        desc.significant_bits = 0;  // splines overshoot
         desc.range.reset();
         desc.has_mask = volume.has_mask && !is_float(type);  // floats have NaN for it
         const double first = grid == 0 ? 0 : 0.5 * step;
@@ -57,7 +56,6 @@ std::string problem_with(const LatticeDesc& lattice) {
 template <class T>
 Samples<T> load(const Lattice& lattice, int component, const std::stop_token& stop) {
     Samples<T> samples;
-    std::atomic<bool> finite{true};
     for (const int grid : {0, 1}) {
         const VolumePtr volume = in_memory(std::get<VolumePtr>(lattice.grids()[std::size_t(grid)]), stop);
         const VolumeDesc& desc = volume->desc();
@@ -71,17 +69,13 @@ Samples<T> load(const Lattice& lattice, int component, const std::stop_token& st
                 const std::size_t first = std::size_t(z) * slice;
                 to_double(desc.type, volume->data() + first * desc.voxel_bytes(), values.size(), values.data());
                 if (desc.has_mask) volume->read_mask({{0, 0, z}, {desc.dims.x, desc.dims.y, z + 1}}, valid);
-                bool all = true;
                 for (std::size_t i = 0; i < slice; ++i) {
                     const double v = desc.has_mask && !valid[i] ? std::numeric_limits<double>::quiet_NaN() : values[i * components + std::size_t(component)];
-                    all = all && std::isfinite(v);
                     samples.values[grid][first + i] = T(std::isfinite(v) ? v : std::numeric_limits<double>::quiet_NaN());
                 }
-                if (!all) finite = false;
             }
         }, stop);
     }
-    samples.all_finite = finite;
     return samples;
 }
 

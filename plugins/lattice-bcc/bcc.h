@@ -33,7 +33,6 @@ template <class T>
 struct Samples {
     Index3 dims[2]{};
     std::vector<T> values[2];
-    bool all_finite = true;
 
     // Beyond the ends the last sample is continued.
     double at(int grid, std::int64_t x, std::int64_t y, std::int64_t z) const {

@@ -26,7 +26,7 @@ constexpr const char* kMethod = R"(
 
 `average` is the mean of both grids' trilinear interpolation. At sites it returns the mean of a sample and its
 neighbours: resolution is lost, and no prefilter brings it back, for its response is 0 at one frequency of the band.
-`linear-box` has half of its error from 4 samples. Where a kernel meets samples that are not valid the linear box of the valid
+`linear-box` has 56 to 80 % of its error, from 4 samples. Where a kernel meets samples that are not valid the linear box of the valid
 ones takes its place; NaN, or 0 of integers, where there is none.
 
 **When to use.** To measure reconstruction against the volume, or to hand a lattice to nodes that take volumes. **When not.** In
@@ -54,7 +54,6 @@ VolumeDesc filled_desc(const Params& params, const LatticeDesc& lattice, const V
     }
     if (params.text("type") == "float" && !is_float(a.type)) {
         desc.type = bytes_of(a.type) < 4 ? ScalarType::f32 : ScalarType::f64;
-        desc.significant_bits = 0;
     }
     desc.has_mask = false;
     desc.range.reset();
@@ -83,6 +82,16 @@ void describe_reconstruct(Description& d) {
     }
 }
 
+// The point itself near the lattice; further off one where the last samples are continued, as they are there, in numbers that
+// indices can hold.
+template <class T>
+glm::dvec3 within_reach(const Samples<T>& samples, glm::dvec3 p) {
+    constexpr double kBeyond = 4;
+    const glm::dvec3 most(glm::max(samples.dims[0], samples.dims[1]));
+    for (int a = 0; a < 3; ++a) p[a] = p[a] > -kBeyond ? std::min(p[a], most[a] + kBeyond) : -kBeyond;
+    return p;
+}
+
 // One component of the volume from the lattice's. `to_a` maps voxels to index coordinates of grid A.
 template <class T>
 void fill(const Samples<T>& samples, Kernel kernel, const glm::dmat4& to_a, const VolumeDesc& desc, int component, Buffer& voxels, Evaluation& e) {
@@ -98,7 +107,7 @@ void fill(const Samples<T>& samples, Kernel kernel, const glm::dmat4& to_a, cons
             for (std::int64_t line = lo; line < hi; ++line) {
                 const glm::dvec4 first = to_a * glm::dvec4(0, double(line % desc.dims.y), double(line / desc.dims.y), 1);
                 for (std::size_t x = 0; x < row; ++x) {
-                    const glm::dvec3 p(first + double(x) * to_a[0]);
+                    const glm::dvec3 p = within_reach(samples, glm::dvec3(first + double(x) * to_a[0]));
                     double v = inner.holds(p) ? reconstruct<k>(inner, p) : reconstruct<k>(source, p);
                     if (!std::isfinite(v)) v = reconstruct_valid(samples, p);
                     values[x] = v;

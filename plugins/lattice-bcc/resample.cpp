@@ -12,6 +12,7 @@ namespace voxloom::bcc {
 
 namespace {
 
+constexpr double kHuge = 1e300;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 double apply(const Taps& taps, const double* line, std::int64_t stride) {
@@ -45,7 +46,8 @@ class Resampler {
         check_stop(stop_);
         LatticeDesc desc = lattice_desc(volume_.desc(), options_.step, options_.type);
         const int components = volume_.desc().components;
-        steps_ = 2 * components;
+        if (options_.filter) survey();
+        for (const bool invalid : invalid_) passes_ += invalid ? 8 : 2;
         std::vector<Value> grids;
         for (std::size_t g = 0; g < 2; ++g) {
             VolumeDesc& form = std::get<VolumeDesc>(desc.grids[g].grid.detail);
@@ -63,17 +65,35 @@ class Resampler {
     }
 
   private:
+    // What both grids must know alike before either is filtered: which components have something invalid, and whether values are so
+    // large that sums of a few would be no numbers.
+    void survey() {
+        const VolumeDesc& desc = volume_.desc();
+        if (!desc.has_mask && !is_float(desc.type)) return;
+        std::vector<std::atomic<bool>> invalid(invalid_.size());
+        std::atomic<bool> huge{false};
+        parallel_for(0, desc.dims.z, 1, [&](std::int64_t lo, std::int64_t hi) {
+            std::vector<double> slice(std::size_t(desc.dims.x * desc.dims.y));
+            for (std::int64_t z = lo; z < hi; ++z)
+                for (std::size_t c = 0; c < invalid.size(); ++c) {
+                    read_slice(z, int(c), Read::values, slice);
+                    for (const double v : slice) {
+                        if (std::isnan(v)) invalid[c] = true;
+                        if (std::abs(v) > kHuge) huge = true;
+                    }
+                }
+        }, stop_);
+        for (std::size_t c = 0; c < invalid.size(); ++c) invalid_[c] = invalid[c];
+        if (huge) scale_ = 0x1p-8;
+    }
+
     Buffer sites(const Grid& grid, int component) {
-        const double begin = double(done_++) / steps_;
-        if (!options_.filter) return closed_form(grid, begin);
-        if (!some_invalid_) {
-            Buffer values = filtered(grid, component, *options_.filter, Read::values, begin);
-            if (!some_invalid_) return values;
-        }
-        Buffer values = filtered(grid, component, *options_.filter == Filter::linear ? Filter::linear : Filter::catmull_rom, Read::valid_values, begin);
-        const Buffer touched = filtered(grid, component, Filter::catmull_rom, Read::invalidity, begin);
-        const Buffer sum = filtered(grid, component, Filter::linear, Read::valid_values, begin);
-        const Buffer weight = filtered(grid, component, Filter::linear, Read::validity, begin);
+        if (!options_.filter) return closed_form(grid);
+        if (!invalid_[std::size_t(component)]) return filtered(grid, component, *options_.filter, Read::values);
+        Buffer values = filtered(grid, component, *options_.filter == Filter::linear ? Filter::linear : Filter::catmull_rom, Read::valid_values);
+        const Buffer touched = filtered(grid, component, Filter::catmull_rom, Read::invalidity);
+        const Buffer sum = filtered(grid, component, Filter::linear, Read::valid_values);
+        const Buffer weight = filtered(grid, component, Filter::linear, Read::validity);
         for (std::size_t i = 0; i < values.as<double>().size(); ++i) {
             const double w = weight.as<double>()[i];
             if (touched.as<double>()[i] > 0) values.as<double>()[i] = w > 1e-12 ? sum.as<double>()[i] / w : kNaN;
@@ -81,7 +101,7 @@ class Resampler {
         return values;
     }
 
-    Buffer closed_form(const Grid& grid, double begin) {
+    Buffer closed_form(const Grid& grid) {
         const ClosedForm* form = volume_.closed_form();
         if (!form) fail("this volume has no closed form; take another filter");
         if (volume_.desc().components != 1) fail("a closed form has one component, and this volume {}", volume_.desc().components);
@@ -95,14 +115,15 @@ class Resampler {
                         const glm::dvec3 at = grid.first + grid.step * glm::dvec3(double(x), double(y), double(z));
                         *out++ = form->value(glm::dvec3(volume_.desc().index_to_world * glm::dvec4(at, 1)));
                     }
-                tell(begin + double(++slices) / double(grid.dims.z) / steps_);
+                tell(double(++slices) / double(grid.dims.z));
             }
         }, stop_);
+        ++done_;
         return values;
     }
 
     // Along x and y slice by slice as they are read, then along z.
-    Buffer filtered(const Grid& grid, int component, Filter filter, Read what, double begin) {
+    Buffer filtered(const Grid& grid, int component, Filter filter, Read what) {
         const Index3 n = volume_.desc().dims;
         const auto across = grid.taps(filter, 0, n.x), down = grid.taps(filter, 1, n.y), deep = grid.taps(filter, 2, n.z);
         const std::int64_t slice = grid.dims.x * grid.dims.y;
@@ -125,7 +146,7 @@ class Resampler {
                     for (std::int64_t y = 0; y < grid.dims.y; ++y)
                         slices[std::size_t(z * slice + y * grid.dims.x + x)] = along(touches, down[std::size_t(y)], line, grid.dims.x);
                 }
-                tell(begin + 0.8 * double(++read) / double(n.z) / steps_);
+                tell(0.8 * double(++read) / double(n.z));
             }
         }, stop_);
         parallel_for(0, slice, 256, [&](std::int64_t lo, std::int64_t hi) {
@@ -136,6 +157,7 @@ class Resampler {
                 for (std::int64_t z = 0; z < grid.dims.z; ++z) values[std::size_t(z * slice + i)] = along(touches, deep[std::size_t(z)], line.data(), 1);
             }
         }, stop_);
+        ++done_;
         return result;
     }
 
@@ -159,12 +181,16 @@ class Resampler {
         for (std::size_t i = 0; i < count; ++i) {
             const double v = values[i * components + std::size_t(component)];
             const bool valid = std::isfinite(v) && (mask.empty() || mask[i]);
-            if (!valid) some_invalid_ = true;
-            out[i] = what == Read::validity ? double(valid) : what == Read::invalidity ? double(!valid) : valid ? v : 0;
+            switch (what) {
+                case Read::values: out[i] = valid ? v * scale_ : kNaN; break;
+                case Read::valid_values: out[i] = valid ? v * scale_ : 0; break;
+                case Read::validity: out[i] = valid; break;
+                case Read::invalidity: out[i] = !valid; break;
+            }
         }
     }
 
-    std::shared_ptr<const DenseVolume> dense(VolumeDesc form, std::span<const double> values) {
+    std::shared_ptr<const DenseVolume> dense(VolumeDesc form, std::span<double> values) {
         const std::size_t components = std::size_t(form.components);
         Buffer mask;
         if (form.has_mask) {
@@ -175,21 +201,24 @@ class Resampler {
                 mask.data()[i] = std::byte(valid);
             }
         }
+        if (scale_ != 1)
+            for (double& v : values) v = std::clamp(v / scale_, std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max());
         Buffer voxels(form.dense_bytes(), "lattice");
         from_double(values.data(), values.size(), form.type, voxels.data());
         return std::make_shared<const DenseVolume>(std::move(form), std::move(voxels), std::move(mask));
     }
 
-    void tell(double fraction) const {
-        if (progress_) progress_(std::min(fraction, 1.0));
+    void tell(double of_pass) const {
+        if (progress_) progress_(std::min((done_ + of_pass) / passes_, 1.0));
     }
 
     const Volume& volume_;
     const ResampleOptions& options_;
     const std::stop_token& stop_;
     const std::function<void(double)>& progress_;
-    std::atomic<bool> some_invalid_{false};
-    int done_ = 0, steps_ = 1;
+    std::vector<bool> invalid_ = std::vector<bool>(std::size_t(volume_.desc().components));  // of each component
+    double scale_ = 1;  // of what is filtered
+    int done_ = 0, passes_ = 0;
 };
 
 }  // namespace

@@ -16,7 +16,9 @@ struct ResampleOptions {
     ScalarType type = ScalarType::f32;
 };
 
-// The volume is read slice by slice; memory beside the lattice is eight bytes for half as many samples as the volume has.
+// The volume is read slice by slice, once a grid and component, and once before where there may be something that is not valid.
+// Memory beside the lattice is eight bytes for each of its sites, for each component, and for half of the volume's voxels; five
+// times the sites' where something is not valid.
 //
 // What is not finite, or masked out, takes no part: a site whose footprint of four samples an axis touches such a voxel takes
 // the trilinear mean of those of its eight neighbours that are valid, and is NaN (of integers: masked out) where none

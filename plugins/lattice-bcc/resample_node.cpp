@@ -48,7 +48,9 @@ void describe_resample(Description& d) {
         const ResampleOptions options = options_of(d.params(), volume->type);
         LatticeDesc lattice = lattice_desc(*volume, options.step, options.type);
         const Index3 a = lattice.grids[0].grid.volume()->dims;
-        d.working_memory(checked_product({a.x, a.y, volume->dims.z + a.z}, 8 + 8 * std::uint64_t(volume->components), "the lattice"));
+        const std::uint64_t sites = is_float(volume->type) || volume->has_mask ? 4 : 1;  // as many arrays of them at a time
+        d.working_memory(checked_product(a, 8 * (sites + std::uint64_t(volume->components)), "the lattice") +
+                         checked_product({a.x, a.y, volume->dims.z}, 8, "the lattice"));
         d.output("lattice", std::move(lattice));
     } catch (const Error& e) {
         d.problem(e.what());
