@@ -75,15 +75,33 @@ bool is_constant(const Block<T>& values) {
     return std::ranges::all_of(values, [&](T v) { return v == values[0]; });
 }
 
-// Differences are counted in this: 1 for integers; for floats a power of two near the extent of the volume, so that
-// their squares neither vanish nor overflow.
-inline double unit_for(ScalarType type, ValueRange range) {
+// The exponent of half of what the values span, of which the whole may be beyond double. They are finite, and not all the same.
+template <class T>
+int exponent_of(const Block<T>& values) {
+    const auto [least, most] = std::ranges::minmax(values);
+    int exponent = 0;
+    (void)std::frexp(double(most) / 2 - double(least) / 2, &exponent);
+    return exponent;
+}
+
+// Differences are counted in this: 1 for integers; for floats a power of two near the extent of the volume, but not much above
+// that of the block in the middle of all, whose exponent is `middle`: squares of differences must not vanish in float
+// because a few voxels hold something huge.
+constexpr int kNarrow = 20, kWide = 40;  // exponents below and above the unit's that blocks may have
+inline double unit_for(ScalarType type, ValueRange range, std::optional<int> middle = {}) {
     if (!is_float(type)) return 1;
     const double half = range.max / 2 - range.min / 2;  // the whole may be beyond double
     if (!(half > 0)) return range.extent() > 0 ? std::numeric_limits<double>::denorm_min() : 1;
     int exponent = 0;
     (void)std::frexp(half, &exponent);
+    if (middle) exponent = std::min(exponent, *middle + kNarrow);
     return std::ldexp(1.0, std::clamp(exponent + 1, -1074, 1023));
+}
+// Squares of what is wider would be no numbers in float: such blocks are kept as they are.
+template <class T>
+bool is_too_wide(const Block<T>& values, double unit) {
+    if constexpr (std::is_floating_point_v<T>) return exponent_of(values) > std::ilogb(unit) + kWide;
+    return false;
 }
 inline double in_units(double v, double from, double unit) {
     const double d = v - from;

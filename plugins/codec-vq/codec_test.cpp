@@ -197,7 +197,7 @@ TEST(Codec, KeepsBlocksWithSomethingNotFinite) {
             return i.z == 0 && i.y == 8 && i.x < 6 && c == 1 ? odd[i.x] : std::sin(double(i.x + i.y)) + 2 * c;
         });
         const Encoded e = encoded(*volume, small());
-        EXPECT_EQ(e.report.raw_blocks, 1u);
+        EXPECT_EQ(e.report.raw_blocks, 2u) << "of those with NaN, and with 1e30";
         const auto before = numbers(bytes_of_volume(*volume), type), after = numbers(decoded(e.bricks), type);
         for (std::int64_t z = 0; z < 4; ++z)
             for (std::int64_t x = 0; x < 4; ++x) {
@@ -209,6 +209,33 @@ TEST(Codec, KeepsBlocksWithSomethingNotFinite) {
         const Encoded none = encoded(*nothing, small());
         for (const double v : numbers(decoded(none.bricks), type)) EXPECT_FALSE(std::isfinite(v));
         EXPECT_EQ(none.bricks->info({}).range, ValueRange{});
+    }
+}
+
+TEST(Codec, AFewHugeVoxelsDoNotHarmTheOthers) {
+    for (const double huge : {0.0, 1e10, 1e20, 1e22, 1e30, -3e38}) {
+        const VolumePtr volume = volume_of({32, 32, 32}, ScalarType::f32, 1, [&](Index3 i, int) {
+            if (huge != 0 && i == Index3(9, 9, 9)) return huge;
+            return std::sin(0.3 * double(i.x)) + std::cos(0.2 * double(i.y)) + std::sin(0.25 * double(i.z));
+        });
+        const Encoded e = encoded(*volume, small(128, Loop::closed));
+        const auto before = numbers(bytes_of_volume(*volume), ScalarType::f32), after = numbers(decoded(e.bricks), ScalarType::f32);
+        double squares = 0;
+        for (std::size_t i = 0; i < before.size(); ++i) {
+            const std::size_t x = i % 32, y = i / 32 % 32, z = i / 1024;
+            if (x / 4 == 2 && y / 4 == 2 && z / 4 == 2) continue;  // the block that it is in
+            squares += std::pow(before[i] - after[i], 2);
+        }
+        EXPECT_LT(std::sqrt(squares / double(before.size())), 0.08) << huge;
+        EXPECT_GT(e.report.distortion, 0.01) << huge;
+    }
+}
+
+TEST(Codec, TheDistortionOfAWholeSampleIsTheErrorInBothLoops) {
+    for (const Loop loop : kLoops) {
+        const VolumePtr volume = scene({40, 36, 28}, ScalarType::f32);
+        const Encoded e = encoded(*volume, small(32, loop));
+        EXPECT_NEAR(e.report.distortion / e.report.rmse, 1, 0.03);
     }
 }
 

@@ -36,7 +36,7 @@ Planes<T> quantised(const Channel<const T>& from, double unit, Loop loop, const 
     std::vector<float> differences;
     for_each_block(from.dims, [&](Index3 block, std::size_t i) {
         const Block<T> values = read_block(from, block);
-        if (!all_finite(values)) {
+        if (!all_finite(values) || (!is_constant(values) && is_too_wide(values, unit))) {
             planes.raw.emplace_back(i, values);
         } else if (is_constant(values)) {
             planes.means[i] = values[0];

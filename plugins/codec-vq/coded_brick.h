@@ -1,7 +1,7 @@
 // One brick and its bytes. Little-endian, T the volume's scalar type, n = ceil(x/4) ceil(y/4) ceil(z/4) blocks:
 //     2 T      smallest and largest finite value of the original, 0 and 0 where nothing is finite
 //     for each component: n T means; n u8 codewords of the octants; n u8 codewords of the voxels
-//     for each component: varint count of blocks that are kept as they are, because something in them is not finite;
+//     for each component: varint count of blocks that are kept as they are, because something in them is not finite, or too wide;
 //         for each: varint blocks since the last one (the first: since the beginning); 64 T
 #pragma once
 

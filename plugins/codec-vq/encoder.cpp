@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
 #include "core/base/meter.h"
 #include "core/base/parallel.h"
@@ -60,7 +62,7 @@ class Encoder {
         report_ = {};
         const Survey seen = survey(volume_, index_, stop_, [&](double f) { tell(kSurveyed * f); });
         index_.desc.volume.range = seen.range;
-        index_.unit = unit_for(desc().type, seen.range);
+        index_.unit = unit_for(desc().type, seen.range, seen.middle);
         train_all(seen);
         return emit();
     }
@@ -105,7 +107,8 @@ class Encoder {
         for (std::size_t i = 0; i < count; ++i)
             for (const float mean : octant_means(differences.vector(i))) octants.numbers.push_back(mean);
         Codebooks books;
-        books.octants = book_from(octants).book;
+        Training first = book_from(octants);
+        books.octants = std::move(first.book);
         std::vector<std::uint8_t> index(count);
         std::vector<float> distance(count);
         if (options_.loop == Loop::closed)
@@ -118,6 +121,8 @@ class Encoder {
         Training voxels = book_from(std::move(differences));
         books.voxels = std::move(voxels.book);
         distortion.sum += voxels.distortion.back();
+        // The second codebook did not see what the first one left, of which each octant is a mean of eight voxels.
+        if (options_.loop == Loop::open) distortion.sum += (kVoxels / kOctants) * first.distortion.back();
         distortion.vectors += double(count);
         report_.sampled += count;
         return books;
@@ -147,11 +152,9 @@ class Encoder {
         const BrickForm form = index_.form(box.dims());
         const Buffer voxels = voxels_of_brick(volume_, box, stop_);
         const std::span<const Codebooks> books = index_.books_of(id);
-        const std::size_t components = books.size();
         Outcome outcome;
         const std::int64_t start = thread_cpu_ns();
-        outcome.brick = code_brick(form, options_.loop, books, search.subspan(index_.macroblock_of(id) * components, components),
-                                   voxels.bytes());
+        outcome.brick = code_brick(form, options_.loop, books, search, voxels.bytes());
         outcome.codec_ns = thread_cpu_ns() - start;
         Buffer decoded(voxels.size(), "brick");
         decode_brick(form, books, outcome.brick.bytes, decoded.bytes());
@@ -163,10 +166,23 @@ class Encoder {
         return outcome;
     }
 
+    // Tables are larger than the codebooks: of the macroblocks of a batch alone.
+    void make_search(std::size_t first, std::size_t count, std::map<std::size_t, std::vector<BrickSearch>>& search) const {
+        std::set<std::size_t> met;
+        for (std::size_t b = first; b < first + count; ++b) met.insert(index_.macroblock_of(index_.id(b)));
+        std::erase_if(search, [&](const auto& one) { return !met.contains(one.first); });
+        const auto components = std::size_t(desc().components);
+        for (const std::size_t m : met) {
+            std::vector<BrickSearch>& tables = search[m];
+            for (std::size_t c = tables.size(); c < components; ++c) {
+                const Codebooks& books = index_.books[m * components + c];
+                tables.push_back({search_table(books.octants.words, kOctants), search_table(books.voxels.words, kVoxels)});
+            }
+        }
+    }
+
     VqBricksPtr emit() {
-        std::vector<BrickSearch> search;
-        for (const Codebooks& books : index_.books)
-            search.push_back({search_table(books.octants.words, kOctants), search_table(books.voxels.words, kVoxels)});
+        std::map<std::size_t, std::vector<BrickSearch>> search;  // of the macroblocks that are met, of each component
         index_.places.resize(count_);
         index_.infos.resize(count_);
         std::vector<BrickParts> parts(count_);
@@ -176,8 +192,9 @@ class Encoder {
         std::uint64_t finite = 0;
         for (std::size_t first = 0; first < count_; first += kBatch) {
             const std::size_t here = std::min<std::size_t>(kBatch, count_ - first);
+            make_search(first, here, search);
             parallel_for(0, std::int64_t(here), 1, [&](std::int64_t lo, std::int64_t hi) {
-                for (auto i = std::size_t(lo); i < std::size_t(hi); ++i) batch[i] = code(first + i, search, parts[first + i]);
+                for (auto i = std::size_t(lo); i < std::size_t(hi); ++i) batch[i] = code(first + i, search.at(index_.macroblock_of(index_.id(first + i))), parts[first + i]);
             }, stop_);
             for (std::size_t i = 0; i < here; ++i) {  // in order, whatever the threads did
                 append(first + i, batch[i], *payload);

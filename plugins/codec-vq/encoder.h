@@ -29,8 +29,9 @@ struct EncodeReport {
     double codec_seconds = 0;                  // CPU time of encoding every brick, codebooks given
 };
 
-// Same volume and options, same bytes, whatever the threads and the processor. The volume is read three times, brick by
-// brick; memory is that of the compressed bytes and 600 bytes for each block of one macroblock's sample.
+// Same volume and options, same bytes, whatever the threads and the processor. The volume is read twice, and once more
+// for each component, brick by brick; memory is that of the compressed bytes, of the codebooks, and 600 bytes for each block
+// of one macroblock's sample.
 // Throws Error for what cannot be encoded, Cancelled when asked to stop.
 VqBricksPtr encode(const Volume& volume, const EncodeOptions& options, EncodeReport& report,
                    const std::stop_token& stop = {}, const std::function<void(double)>& progress = {});

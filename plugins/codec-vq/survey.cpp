@@ -1,6 +1,7 @@
 #include "plugins/codec-vq/survey.h"
 
 #include <algorithm>
+#include <map>
 
 #include "core/base/parallel.h"
 #include "plugins/codec-vq/block.h"
@@ -9,7 +10,7 @@ namespace voxloom::vq {
 
 namespace {
 
-// Calls f(values) for each block of a component of a brick that is neither constant nor raw.
+// Calls f(values) for each block of a component of a brick that is neither constant nor without a number.
 template <class T, class F>
 void for_each_coded_block(const Channel<const T>& channel, const F& f) {
     const Index3 n = blocks_of(channel.dims);
@@ -29,6 +30,17 @@ struct Finite {
         any = true;
     }
 };
+
+std::optional<int> middle_of(const std::vector<std::map<int, std::uint64_t>>& counted) {
+    std::map<int, std::uint64_t> all;
+    std::uint64_t sum = 0;
+    for (const auto& brick : counted)
+        for (const auto& [exponent, count] : brick) all[exponent] += count, sum += count;
+    std::uint64_t below = 0;
+    for (const auto& [exponent, count] : all)
+        if ((below += count) * 2 >= sum) return exponent;
+    return std::nullopt;
+}
 
 // A number in [0, 1) for each (seed, i): SplitMix64 (Steele, Lea, Flood 2014).
 double uniform(std::uint64_t seed, std::uint64_t i) {
@@ -65,6 +77,7 @@ Survey survey(const Volume& volume, const VqIndex& index, const std::stop_token&
     Survey result;
     result.coded.resize(count * std::size_t(components));
     std::vector<Finite> ranges(count);
+    std::vector<std::map<int, std::uint64_t>> exponents(count);
     constexpr std::int64_t kBatch = 64;
     for (std::int64_t first = 0; first < std::int64_t(count); first += kBatch) {
         parallel_for(first, std::min(first + kBatch, std::int64_t(count)), 1, [&](std::int64_t lo, std::int64_t hi) {
@@ -76,7 +89,8 @@ Survey survey(const Volume& volume, const VqIndex& index, const std::stop_token&
                     for (const T v : voxels.as<T>())
                         if (std::isfinite(double(v))) ranges[b].add(double(v));
                     for (int c = 0; c < components; ++c)
-                        for_each_coded_block<T>({voxels.as<T>().data(), box.dims(), components, c}, [&](const Block<T>&) {
+                        for_each_coded_block<T>({voxels.as<T>().data(), box.dims(), components, c}, [&](const Block<T>& block) {
+                            if constexpr (std::is_floating_point_v<T>) ++exponents[b][exponent_of(block)];
                             ++result.coded[b * std::size_t(components) + std::size_t(c)];
                         });
                 });
@@ -91,6 +105,7 @@ Survey survey(const Volume& volume, const VqIndex& index, const std::stop_token&
             all.add(range.range.max);
         }
     result.range = all.range;
+    result.middle = middle_of(exponents);
     return result;
 }
 
@@ -112,8 +127,9 @@ Sample sample_of(const Volume& volume, const VqIndex& index, const Survey& surve
                 using T = decltype(t);
                 std::uint64_t at = begins[k];
                 for_each_coded_block<T>({voxels.as<T>().data(), box.dims(), components, component}, [&](const Block<T>& values) {
-                    if (pick < picks.size() && picks[pick] == at++)
-                        mean_and_differences(values, index.unit, options.loop == Loop::closed, &sample.numbers[pick++ * kVoxels]);
+                    if (pick == picks.size() || picks[pick] != at++) return;
+                    float* numbers = &sample.numbers[pick++ * kVoxels];  // of a block that is kept as it is: zero
+                    if (!is_too_wide(values, index.unit)) mean_and_differences(values, index.unit, options.loop == Loop::closed, numbers);
                 });
             });
         }

@@ -1,6 +1,7 @@
 // What has to be known of a volume before its codebooks are trained, and the vectors to train them with.
 #pragma once
 
+#include <optional>
 #include <stop_token>
 
 #include "plugins/codec-vq/encoder.h"
@@ -10,7 +11,8 @@ namespace voxloom::vq {
 
 struct Survey {
     ValueRange range;                   // of the finite values
-    std::vector<std::uint32_t> coded;   // of each brick, of each component: blocks that are neither constant nor raw
+    std::vector<std::uint32_t> coded;   // of each brick, of each component: blocks that are neither constant nor without a number
+    std::optional<int> middle;          // exponent_of() those of floats: as many are below as above
 };
 Survey survey(const Volume& volume, const VqIndex& index, const std::stop_token& stop,
               const std::function<void(double)>& progress);

@@ -45,7 +45,9 @@ void describe_encode(Description& node) {
         node.problem(e.what());
     }
     constexpr std::uint64_t sampled_block = 600;  // its numbers, its octants, and the search for equal ones
-    node.working_memory(sampled_block * std::min<std::uint64_t>(options.sample, volume->voxels() / 64 + 1));
+    const glm::dvec3 m(options.macroblocks);
+    const double codebooks = 4.0 * 72 * options.codewords * m.x * m.y * m.z * volume->components;
+    node.working_memory(sampled_block * std::min<std::uint64_t>(options.sample, volume->voxels() / 64 + 1) + std::uint64_t(std::min(codebooks, 1e15)));
 }
 
 void evaluate_encode(Evaluation& node) {
@@ -85,14 +87,15 @@ NodeType encode_node() {
     type.method = R"(**Method.** A block of 4^3 voxels is its mean, the differences of its eight octants' means, and the differences of its voxels to
 those. Each kind of difference is one codeword of a codebook of up to 256: with a mean of b bits (those of the scalar type) a block
 takes b + 16 bits, and a voxel (b + 16) / 64, whatever is in it. Codebooks come on top: 72 numbers for each pair of codewords, of 16 bits
-for 8-bit volumes and of 32 for others, for each macroblock and component; and an index, 24 to 37 bytes a brick.
+for 8-bit volumes and of 32 for others, for each macroblock and component; and an index, 23 to 39 bytes a brick.
 
 A codebook starts as one cell; the cell with the largest distortion is split across its principal axis until there are enough; sweeps
 move codewords to the centroids of their vectors. The first codeword is always zero, so that constant blocks are exact. Training sees
 a sample of the blocks, every block looks at all codewords. In closed loop the second codebook is trained on and matched with what the
 mean and the first codeword leave; in open loop, as published, with what the exact means leave.
 
-Decoded values stay within the brick's range. Blocks with something that is not finite are kept as they are. There is one level;
+Decoded values stay within the brick's range. Blocks with something that is not finite, or with
+differences a million million times those of the others, are kept as they are. There is one level;
 bricks.pyramid adds coarser ones. `training distortion` is the RMS error of the sample; `training time` is by the clock,
 `codec time` the processor time of quantising all blocks once.
 
