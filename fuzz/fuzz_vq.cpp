@@ -17,9 +17,9 @@ using namespace voxloom::vq;
 constexpr std::uint64_t kMostBytes = 1 << 22;  // of a brick: honest files have larger ones, which only take longer
 
 void decode_some(const VqBricks& bricks) {
-    const std::size_t count = std::min<std::size_t>(bricks.index().places.size(), 8);
+    const std::size_t count = std::min<std::size_t>(bricks.index().bricks.places.size(), 8);
     for (std::size_t i = 0; i < count; ++i) {
-        const BrickId id = bricks.index().id(i);
+        const BrickId id = brick_at(bricks.desc(), i);
         if (bricks.family_bytes(id) > kMostBytes) continue;
         try {
             bricks.refine(id, nullptr, {});

@@ -75,14 +75,14 @@ TEST_P(EveryCodec, KeepsWhatIsNotFinite) {
     }
     const std::uint64_t kept = lossy.report.lossless_bricks + lossy.report.raw_bricks;
     EXPECT_GT(kept, 0u);
-    EXPECT_LT(kept, lossy.bricks->index().places.size());
+    EXPECT_LT(kept, lossy.bricks->index().bricks.places.size());
 }
 
 TEST_P(EveryCodec, NeverGrowsByMoreThanTheIndex) {
     std::mt19937 random(3);
     const VolumePtr noise = volume_of({16, 16, 16}, ScalarType::u16, 1, [&](Index3, int) { return double(random() % 65536); });
     const Encoded e = encoded(*noise, codec(), fast());
-    EXPECT_LE(e.bricks->payload().size(), noise->desc().dense_bytes() + e.bricks->index().places.size());
+    EXPECT_LE(e.bricks->payload().size(), noise->desc().dense_bytes() + e.bricks->index().bricks.places.size());
     EXPECT_EQ(decoded(e.bricks), bytes_of_volume(*noise));
 }
 
@@ -168,8 +168,8 @@ TEST_P(EveryCodec, StatisticsAreThoseOfTheDecodedBricks) {
     const Index3 dims = volume->desc().dims;
     const BricksDesc& desc = e.bricks->desc();
     std::uint64_t bytes = 0;
-    for (std::size_t b = 0; b < e.bricks->index().places.size(); ++b) {
-        const BrickId id = e.bricks->index().id(b);
+    for (std::size_t b = 0; b < e.bricks->index().bricks.places.size(); ++b) {
+        const BrickId id = brick_at(e.bricks->desc(), b);
         const BrickInfo info = e.bricks->info(id);
         const Box own = desc.box_of(id), around{glm::max(own.lo - Index3(1), Index3(0)), glm::min(own.hi + Index3(1), dims)};
         double squares = 0, largest = 0;
@@ -225,7 +225,7 @@ TEST_P(EveryCodec, SlicesAreBricksToo) {
     EncodeOptions options = fast();
     options.brick = {512, 512, 1};
     const Encoded e = encoded(*volume, codec(), options);
-    EXPECT_EQ(e.bricks->index().places.size(), 5u);
+    EXPECT_EQ(e.bricks->index().bricks.places.size(), 5u);
     EXPECT_EQ(decoded(e.bricks), bytes_of_volume(*volume));
 }
 

@@ -68,7 +68,7 @@ class Encoder {
     }
     CodedBrick code(std::size_t i, BrickError& error) const {
         check_stop(stop_);
-        const Box box = index_.desc.box_of(index_.id(i));
+        const Box box = index_.desc.box_of(brick_at(index_.desc, i));
         const Form form = index_.form(box.dims());
         const Buffer voxels = voxels_of(box);
         const double bound = options_.target == Target::max_error ? options_.amount : std::numeric_limits<double>::infinity();
@@ -83,8 +83,8 @@ class Encoder {
         const int rounds = report.rounds;
         report = {};
         report.rounds = rounds;
-        index_.places.assign(count_, {});
-        index_.infos.assign(count_, {});
+        index_.bricks.places.assign(count_, {});
+        index_.bricks.infos.assign(count_, {});
         std::vector<BrickParts> parts(count_);
         auto payload = std::make_shared<Bytes>();
         std::vector<CodedBrick> batch(std::size_t{kBatch});
@@ -97,7 +97,7 @@ class Encoder {
                 for (std::int64_t k = lo; k < hi; ++k) {
                     const auto i = std::size_t(k);
                     batch[i] = code(first + i, errors[i]);
-                    const Box box = index_.desc.box_of(index_.id(first + i));
+                    const Box box = index_.desc.box_of(brick_at(index_.desc, first + i));
                     parts[first + i] = parts_of(box, batch[i].decoded.data(), box, desc().type, desc().components);
                     batch[i].decoded = {};
                 }
@@ -113,15 +113,15 @@ class Encoder {
             }
             tell(from + (to - from) * double(first + here) / double(count_));
         }
-        if (count_ > 0) fill_fine_ranges(index_.desc, parts, index_.infos);
+        if (count_ > 0) fill_fine_ranges(index_.desc, parts, index_.bricks.infos);
         report.codec_seconds = double(codec_ns) * 1e-9;
         return finish(report, sum, std::move(payload));
     }
 
     void append(std::size_t i, const CodedBrick& brick, const BrickError& error, Bytes& payload) {
-        index_.places[i] = {payload.size(), brick.bytes.size(), check_of(brick.bytes)};
+        index_.bricks.places[i] = {payload.size(), brick.bytes.size(), check_of(brick.bytes)};
         payload.insert(payload.end(), brick.bytes.begin(), brick.bytes.end());
-        BrickInfo& info = index_.infos[i];
+        BrickInfo& info = index_.bricks.infos[i];
         info.l2 = info.octant_l2[0] = std::sqrt(error.squares);
         info.max_error = error.largest;
         info.compressed_bytes = brick.bytes.size();
@@ -156,7 +156,7 @@ class Encoder {
             for (std::int64_t k = lo; k < hi; ++k) {
                 const std::size_t at = (std::size_t(k) * count_ + count_ / 2) / some;  // evenly spread
                 sizes[std::size_t(k)] = code(at, errors[std::size_t(k)]).bytes.size();
-                values[std::size_t(k)] = index_.desc.box_of(index_.id(at)).voxels();
+                values[std::size_t(k)] = index_.desc.box_of(brick_at(index_.desc, at)).voxels();
             }
         }, stop_);
         double squares = 0, finite = 0, bytes = 0, voxels = 0;

@@ -55,8 +55,8 @@ TEST_P(BrickFile, ComesBackAsItWasWritten) {
     EXPECT_EQ(opened->desc().volume.range, e.bricks->desc().volume.range);
     EXPECT_EQ(opened->index().codec, &codec());
     EXPECT_EQ(decoded(opened), decoded(e.bricks));
-    for (std::size_t i = 0; i < e.bricks->index().infos.size(); ++i) {
-        const BrickInfo &a = e.bricks->index().infos[i], &b = opened->index().infos[i];
+    for (std::size_t i = 0; i < e.bricks->index().bricks.infos.size(); ++i) {
+        const BrickInfo &a = e.bricks->index().bricks.infos[i], &b = opened->index().bricks.infos[i];
         EXPECT_EQ(a.range, b.range);
         EXPECT_EQ(a.l2, b.l2);
         EXPECT_EQ(a.max_error, b.max_error);

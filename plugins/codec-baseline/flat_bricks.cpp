@@ -16,12 +16,6 @@ Form FlatIndex::form(Index3 dims) const {
     return {dims, desc.volume.type, desc.volume.components, desc.volume.range.value_or(ValueRange{})};
 }
 
-BrickId FlatIndex::id(std::size_t i) const {
-    const glm::i64vec3 n(desc.levels[0].bricks);
-    const auto at = std::int64_t(i);
-    return {0, glm::ivec3(at % n.x, at / n.x % n.y, at / (n.x * n.y))};
-}
-
 BricksDesc flat_desc(const VolumeDesc& volume, glm::ivec3 brick) {
     BricksDesc desc;
     desc.volume = volume;
@@ -39,14 +33,8 @@ FlatBricks::FlatBricks(FlatIndex index, std::span<const std::byte> payload, std:
                        std::uint64_t resident)
     : Bricks(index.desc), index_(std::move(index)), payload_(payload), keeper_(std::move(keeper)), resident_(resident) {}
 
-std::size_t FlatBricks::place_of(BrickId id) const {
-    assert(desc().has(id));
-    const glm::i64vec3 n(desc().levels[0].bricks), i(id.index);
-    return std::size_t((i.z * n.y + i.y) * n.x + i.x);
-}
-
 std::uint64_t FlatBricks::resident_bytes() const {
-    return resident_ + index_.places.size() * (sizeof(BrickPlace) + sizeof(BrickInfo));
+    return resident_ + index_.bricks.bytes();
 }
 
 std::vector<DecodedBrick> FlatBricks::refine(BrickId id, const BrickVoxels*, const std::stop_token& stop) const {
@@ -56,7 +44,7 @@ std::vector<DecodedBrick> FlatBricks::refine(BrickId id, const BrickVoxels*, con
     brick->stored = dims;
     brick->voxels = Buffer(family_bytes(id), "brick");
     try {
-        const BrickPlace& place = index_.places[place_of(id)];
+        const BrickPlace& place = index_.bricks.places[number_of(desc(), id)];
         const auto bytes = payload_.subspan(std::size_t(place.offset), std::size_t(place.size));
         if (check_of(bytes) != place.check) fail("its checksum is wrong");
         decode_brick(*index_.codec, index_.form(dims), index_.setting, bytes, brick->voxels.bytes());

@@ -5,15 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "core/data/bricks.h"
+#include "core/data/brick_index.h"
 #include "plugins/codec-baseline/coded_brick.h"
 
 namespace voxloom::baseline {
-
-struct BrickPlace {
-    std::uint64_t offset = 0, size = 0;  // in the payload
-    std::uint32_t check = 0;
-};
 
 // Everything but the payload.
 struct FlatIndex {
@@ -21,11 +16,9 @@ struct FlatIndex {
     const Codec* codec = nullptr;
     Setting setting;
     std::string provenance;
-    std::vector<BrickPlace> places;  // of each brick, x fastest
-    std::vector<BrickInfo> infos;
+    BrickIndex bricks;
 
     Form form(Index3 dims) const;
-    BrickId id(std::size_t i) const;
 };
 
 // What such bricks of a volume would be; throws Error for bricks that cannot be.
@@ -37,7 +30,7 @@ class FlatBricks final : public Bricks {
     FlatBricks(FlatIndex index, std::span<const std::byte> payload, std::shared_ptr<const void> keeper,
                std::uint64_t resident);
 
-    BrickInfo info(BrickId id) const override { return index_.infos[place_of(id)]; }
+    BrickInfo info(BrickId id) const override { return index_.bricks.infos[number_of(desc(), id)]; }
     std::optional<BrickId> parent(BrickId) const override { return std::nullopt; }
     std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const override;
     std::uint64_t family_bytes(BrickId id) const override {
@@ -49,7 +42,6 @@ class FlatBricks final : public Bricks {
     std::span<const std::byte> payload() const { return payload_; }
 
   private:
-    std::size_t place_of(BrickId id) const;
     FlatIndex index_;
     std::span<const std::byte> payload_;
     std::shared_ptr<const void> keeper_;

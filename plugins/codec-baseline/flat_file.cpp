@@ -9,31 +9,6 @@ namespace voxloom::baseline {
 
 namespace {
 
-void write_info(const BrickInfo& info, ScalarType type, ByteWriter& writer) {
-    with_type(type, [&](auto t) {
-        using T = decltype(t);
-        writer.number(T(info.range.min));
-        writer.number(T(info.range.max));
-    });
-    writer.number(info.l2);
-    writer.number(info.max_error);
-}
-
-BrickInfo read_info(ScalarType type, std::uint64_t bytes, ByteReader& reader) {
-    BrickInfo info;
-    with_type(type, [&](auto t) {
-        info.range.min = double(reader.number<decltype(t)>());
-        info.range.max = double(reader.number<decltype(t)>());
-    });
-    info.l2 = info.octant_l2[0] = reader.number<double>();
-    info.max_error = reader.number<double>();
-    info.compressed_bytes = bytes;
-    info.exact_error = true;
-    if (!(info.range.min <= info.range.max) || !std::isfinite(info.range.extent()) || !(info.l2 >= 0) || !(info.max_error >= 0))
-        fail("its statistics are not numbers");
-    return info;
-}
-
 FlatIndex read_head(std::span<const std::byte> head, std::uint64_t payload) {
     ByteReader reader(head);
     FlatIndex index;
@@ -49,22 +24,7 @@ FlatIndex read_head(std::span<const std::byte> head, std::uint64_t payload) {
     if (!index.codec) fail("it was compressed by {}, which this program was built without", codec);
     if (!std::isfinite(index.setting.amount)) fail("its setting is not a number");
 
-    const std::uint64_t count = checked_product(Index3(index.desc.levels[0].bricks), 1, "a grid of bricks");
-    // The shortest entry: a length, a checksum, two values and two errors.
-    if (count > reader.left() / (1 + 4 + 2 * bytes_of(volume.type) + 16)) fail("its index is too short for its size");
-    index.places.resize(std::size_t(count));
-    index.infos.resize(std::size_t(count));
-    std::uint64_t offset = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        BrickPlace& place = index.places[i];
-        place.offset = offset;
-        place.size = reader.varint();
-        place.check = reader.number<std::uint32_t>();
-        if (place.size > payload - offset) fail("its index points beyond its end");
-        offset += place.size;
-        index.infos[i] = read_info(volume.type, place.size, reader);
-    }
-    if (offset != payload) fail("its index does not cover its data");
+    index.bricks = read_brick_index(index.desc, payload, reader);
     if (reader.left() > 0) fail("its head is longer than it should be");
     return index;
 }
@@ -80,11 +40,7 @@ Bytes front_of(const FlatIndex& index, std::uint64_t payload_bytes) {
     writer.text(index.codec->name);
     writer.number(index.setting.mode);
     writer.number(index.setting.amount);
-    for (std::size_t i = 0; i < index.places.size(); ++i) {
-        writer.varint(index.places[i].size);
-        writer.number(index.places[i].check);
-        write_info(index.infos[i], index.desc.volume.type, writer);
-    }
+    write_brick_index(index.bricks, index.desc.volume.type, writer);
     return enclose(kFlatBrickFile, head, payload_bytes);
 }
 

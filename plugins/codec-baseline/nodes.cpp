@@ -87,7 +87,7 @@ void evaluate_encode(const Codec& codec, Evaluation& node) {
     node.measure("rmse", report.rmse);
     node.measure("max error", report.max_error);
     node.measure("codec time", report.codec_seconds, "s");
-    node.count("bricks", double(bricks->index().places.size()));
+    node.count("bricks", double(bricks->index().bricks.places.size()));
     node.count("bricks kept lossless", double(report.lossless_bricks));
     node.count("bricks kept raw", double(report.raw_bricks));
     node.count("rounds of the search", report.rounds);

@@ -173,7 +173,7 @@ TEST(Codec, MoreCodewordsAndMacroblocksDoBetter) {
     EXPECT_EQ(many.bricks->index().books.size(), 12u);
     EXPECT_LT(many.report.rmse, one);
     options.macroblocks = {64, 64, 64};  // one for each brick, and no more
-    EXPECT_EQ(encoded(*volume, options).bricks->index().books.size(), many.bricks->index().places.size());
+    EXPECT_EQ(encoded(*volume, options).bricks->index().books.size(), many.bricks->index().bricks.places.size());
 }
 
 TEST(Codec, ASampleOfTheBlocksDoes) {
@@ -302,8 +302,8 @@ TEST(Codec, StatisticsAreThoseOfTheDecodedBricks) {
     const Index3 dims = volume->desc().dims;
     const BricksDesc& desc = e.bricks->desc();
     std::uint64_t bytes = 0;
-    for (std::size_t b = 0; b < e.bricks->index().places.size(); ++b) {
-        const BrickId id = e.bricks->index().id(b);
+    for (std::size_t b = 0; b < e.bricks->index().bricks.places.size(); ++b) {
+        const BrickId id = brick_at(e.bricks->desc(), b);
         const BrickInfo info = e.bricks->info(id);
         const Box own = desc.box_of(id), around{glm::max(own.lo - Index3(1), Index3(0)), glm::min(own.hi + Index3(1), dims)};
         double squares = 0, largest = 0;

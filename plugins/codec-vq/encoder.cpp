@@ -86,7 +86,7 @@ class Encoder {
         const std::int64_t start = wall_ns();
         const std::size_t macroblocks = Box::of(Index3(index_.macroblocks)).voxels();
         std::vector<std::vector<std::size_t>> bricks(macroblocks);
-        for (std::size_t b = 0; b < count_; ++b) bricks[index_.macroblock_of(index_.id(b))].push_back(b);
+        for (std::size_t b = 0; b < count_; ++b) bricks[index_.macroblock_of(brick_at(index_.desc, b))].push_back(b);
         Distortion distortion;
         for (std::size_t m = 0; m < macroblocks; ++m)
             for (int c = 0; c < desc().components; ++c) {
@@ -147,7 +147,7 @@ class Encoder {
     };
 
     Outcome code(std::size_t b, std::span<const BrickSearch> search, BrickParts& parts) const {
-        const BrickId id = index_.id(b);
+        const BrickId id = brick_at(index_.desc, b);
         const Box box = index_.desc.box_of(id);
         const BrickForm form = index_.form(box.dims());
         const Buffer voxels = voxels_of_brick(volume_, box, stop_);
@@ -169,7 +169,7 @@ class Encoder {
     // Tables are larger than the codebooks: of the macroblocks of a batch alone.
     void make_search(std::size_t first, std::size_t count, std::map<std::size_t, std::vector<BrickSearch>>& search) const {
         std::set<std::size_t> met;
-        for (std::size_t b = first; b < first + count; ++b) met.insert(index_.macroblock_of(index_.id(b)));
+        for (std::size_t b = first; b < first + count; ++b) met.insert(index_.macroblock_of(brick_at(index_.desc, b)));
         std::erase_if(search, [&](const auto& one) { return !met.contains(one.first); });
         const auto components = std::size_t(desc().components);
         for (const std::size_t m : met) {
@@ -183,8 +183,8 @@ class Encoder {
 
     VqBricksPtr emit() {
         std::map<std::size_t, std::vector<BrickSearch>> search;  // of the macroblocks that are met, of each component
-        index_.places.resize(count_);
-        index_.infos.resize(count_);
+        index_.bricks.places.resize(count_);
+        index_.bricks.infos.resize(count_);
         std::vector<BrickParts> parts(count_);
         std::vector<Outcome> batch(std::size_t{kBatch});
         auto payload = std::make_shared<Bytes>();
@@ -194,7 +194,7 @@ class Encoder {
             const std::size_t here = std::min<std::size_t>(kBatch, count_ - first);
             make_search(first, here, search);
             parallel_for(0, std::int64_t(here), 1, [&](std::int64_t lo, std::int64_t hi) {
-                for (auto i = std::size_t(lo); i < std::size_t(hi); ++i) batch[i] = code(first + i, search.at(index_.macroblock_of(index_.id(first + i))), parts[first + i]);
+                for (auto i = std::size_t(lo); i < std::size_t(hi); ++i) batch[i] = code(first + i, search.at(index_.macroblock_of(brick_at(index_.desc, first + i))), parts[first + i]);
             }, stop_);
             for (std::size_t i = 0; i < here; ++i) {  // in order, whatever the threads did
                 append(first + i, batch[i], *payload);
@@ -203,7 +203,7 @@ class Encoder {
             }
             tell(kTrained + (1 - kTrained) * double(first + here) / double(count_));
         }
-        if (count_ > 0) fill_fine_ranges(index_.desc, parts, index_.infos);
+        if (count_ > 0) fill_fine_ranges(index_.desc, parts, index_.bricks.infos);
         report_.rmse = finite ? std::sqrt(squares.value() / double(finite)) : 0;
         report_.psnr = psnr(desc().range->extent(), report_.rmse);
         index_.desc.compressed_bytes = front_of(index_, payload->size()).size() + payload->size();
@@ -214,9 +214,9 @@ class Encoder {
 
     void append(std::size_t b, const Outcome& outcome, Bytes& payload) {
         const Bytes& bytes = outcome.brick.bytes;
-        index_.places[b] = {payload.size(), bytes.size(), check_of(bytes)};
+        index_.bricks.places[b] = {payload.size(), bytes.size(), check_of(bytes)};
         payload.insert(payload.end(), bytes.begin(), bytes.end());
-        BrickInfo& info = index_.infos[b];
+        BrickInfo& info = index_.bricks.infos[b];
         info.l2 = info.octant_l2[0] = std::sqrt(outcome.error.squares);
         info.max_error = outcome.error.largest;
         info.compressed_bytes = bytes.size();

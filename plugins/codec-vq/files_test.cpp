@@ -49,8 +49,8 @@ TEST(VqFile, ComesBackAsItWasWritten) {
         EXPECT_EQ(opened->index().macroblocks, glm::ivec3(2, 1, 2));
         EXPECT_THAT(opened->index().provenance, HasSubstr("16 codewords, closed loop, 2 x 1 x 2 macroblocks, from density"));
         EXPECT_EQ(decoded(opened), decoded(e.bricks));
-        for (std::size_t i = 0; i < e.bricks->index().infos.size(); ++i) {
-            const BrickInfo &a = e.bricks->index().infos[i], &b = opened->index().infos[i];
+        for (std::size_t i = 0; i < e.bricks->index().bricks.infos.size(); ++i) {
+            const BrickInfo &a = e.bricks->index().bricks.infos[i], &b = opened->index().bricks.infos[i];
             EXPECT_EQ(a.range, b.range);
             EXPECT_EQ(a.l2, b.l2);
             EXPECT_EQ(a.max_error, b.max_error);
@@ -150,10 +150,10 @@ TEST(VqFile, ForgedHeadsAreRefused) {
     refused([](VqIndex& i) { i.books[0].voxels.words.resize(64 * 300); }, "300 codewords");
     refused([](VqIndex& i) { i.books[0].octants.words.back() = NAN; }, "codeword");
     refused([](VqIndex& i) { i.books[0].octants.words.back() = 1e20f; }, "codeword");
-    refused([](VqIndex& i) { i.places[0].size += 1000000; }, "beyond its end");
-    refused([](VqIndex& i) { i.places[0].size -= 1; }, "too short");
-    refused([](VqIndex& i) { i.places.pop_back(); }, "too short");
-    refused([](VqIndex& i) { i.infos[0].max_error = NAN; }, "statistics");
+    refused([](VqIndex& i) { i.bricks.places[0].size += 1000000; }, "beyond its end");
+    refused([](VqIndex& i) { i.bricks.places[0].size -= 1, i.bricks.places[1].size += 1; }, "a brick is too short");
+    refused([](VqIndex& i) { i.bricks.places.pop_back(); }, "too short");
+    refused([](VqIndex& i) { i.bricks.infos[0].max_error = NAN; }, "statistics");
 }
 
 TEST(VqFile, AFailedWriteLeavesTheOldFile) {
@@ -193,7 +193,7 @@ TEST(VqFile, GoldenFilesStayReadable) {
         double squares = 0, told = 0;
         for (std::size_t i = 0; i < before.size(); ++i)
             if (std::isfinite(before[i])) squares += (before[i] - after[i]) * (before[i] - after[i]);
-        for (const BrickInfo& info : opened->index().infos) told += info.l2 * info.l2;
+        for (const BrickInfo& info : opened->index().bricks.infos) told += info.l2 * info.l2;
         EXPECT_NEAR(squares, told, 1e-9 * told) << golden;
         EXPECT_GT(told, 0);
         // The encoder gives the same bytes on every processor.

@@ -82,7 +82,7 @@ Survey survey(const Volume& volume, const VqIndex& index, const std::stop_token&
     for (std::int64_t first = 0; first < std::int64_t(count); first += kBatch) {
         parallel_for(first, std::min(first + kBatch, std::int64_t(count)), 1, [&](std::int64_t lo, std::int64_t hi) {
             for (auto b = std::size_t(lo); b < std::size_t(hi); ++b) {
-                const Box box = index.desc.box_of(index.id(b));
+                const Box box = index.desc.box_of(brick_at(index.desc, b));
                 const Buffer voxels = voxels_of_brick(volume, box, stop);
                 with_type(volume.desc().type, [&](auto t) {
                     using T = decltype(t);
@@ -121,7 +121,7 @@ Sample sample_of(const Volume& volume, const VqIndex& index, const Survey& surve
         for (auto k = std::size_t(lo); k < std::size_t(hi); ++k) {
             auto pick = std::size_t(std::ranges::lower_bound(picks, begins[k]) - picks.begin());
             if (pick == picks.size() || picks[pick] >= begins[k + 1]) continue;
-            const Box box = index.desc.box_of(index.id(bricks[k]));
+            const Box box = index.desc.box_of(brick_at(index.desc, bricks[k]));
             const Buffer voxels = voxels_of_brick(volume, box, stop);
             with_type(volume.desc().type, [&](auto t) {
                 using T = decltype(t);

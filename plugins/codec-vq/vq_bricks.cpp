@@ -18,12 +18,6 @@ std::size_t place_in(glm::ivec3 grid, glm::ivec3 i) {
 
 }  // namespace
 
-BrickId VqIndex::id(std::size_t brick) const {
-    const glm::i64vec3 n(desc.levels[0].bricks);
-    const auto at = std::int64_t(brick);
-    return {0, glm::ivec3(at % n.x, at / n.x % n.y, at / (n.x * n.y))};
-}
-
 std::size_t VqIndex::macroblock_of(BrickId id) const {
     const glm::i64vec3 share = glm::i64vec3(id.index) * glm::i64vec3(macroblocks) / glm::i64vec3(desc.levels[0].bricks);
     return place_in(macroblocks, glm::ivec3(share));
@@ -56,15 +50,10 @@ glm::ivec3 macroblocks_for(const BricksDesc& desc, glm::ivec3 wanted) {
 VqBricks::VqBricks(VqIndex index, std::span<const std::byte> payload, std::shared_ptr<const void> keeper, std::uint64_t resident)
     : Bricks(index.desc), index_(std::move(index)), payload_(payload), keeper_(std::move(keeper)), resident_(resident) {}
 
-std::size_t VqBricks::place_of(BrickId id) const {
-    assert(desc().has(id));
-    return place_in(desc().levels[0].bricks, id.index);
-}
-
 std::uint64_t VqBricks::resident_bytes() const {
     std::uint64_t numbers = 0;
     for (const Codebooks& books : index_.books) numbers += books.octants.words.size() + books.voxels.words.size();
-    return resident_ + numbers * sizeof(float) + index_.places.size() * (sizeof(BrickPlace) + sizeof(BrickInfo));
+    return resident_ + numbers * sizeof(float) + index_.bricks.bytes();
 }
 
 std::vector<DecodedBrick> VqBricks::refine(BrickId id, const BrickVoxels*, const std::stop_token& stop) const {
@@ -74,7 +63,7 @@ std::vector<DecodedBrick> VqBricks::refine(BrickId id, const BrickVoxels*, const
     brick->stored = dims;
     brick->voxels = Buffer(family_bytes(id), "brick");
     try {
-        const BrickPlace& place = index_.places[place_of(id)];
+        const BrickPlace& place = index_.bricks.places[number_of(desc(), id)];
         const auto bytes = payload_.subspan(std::size_t(place.offset), std::size_t(place.size));
         if (check_of(bytes) != place.check) fail("its checksum is wrong");
         decode_brick(index_.form(dims), index_.books_of(id), bytes, brick->voxels.bytes());

@@ -8,15 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/data/bricks.h"
+#include "core/data/brick_index.h"
 #include "plugins/codec-vq/coded_brick.h"
 
 namespace voxloom::vq {
-
-struct BrickPlace {
-    std::uint64_t offset = 0, size = 0;  // in the payload
-    std::uint32_t check = 0;
-};
 
 // Everything but the payload.
 struct VqIndex {
@@ -26,11 +21,9 @@ struct VqIndex {
     glm::ivec3 macroblocks{1};      // along each axis, each with codebooks of its own; at most as many as bricks
     std::vector<Codebooks> books;   // of each macroblock, x fastest; within one, of each component
     std::string provenance;
-    std::vector<BrickPlace> places;  // of each brick, x fastest
-    std::vector<BrickInfo> infos;
+    BrickIndex bricks;
 
     BrickForm form(Index3 dims) const { return {dims, desc.volume.type, desc.volume.components, unit}; }
-    BrickId id(std::size_t brick) const;
     std::size_t macroblock_of(BrickId id) const;
     std::span<const Codebooks> books_of(BrickId id) const;
 };
@@ -45,7 +38,7 @@ class VqBricks final : public Bricks {
     // `keeper` keeps the payload alive; `resident` is the memory that it takes.
     VqBricks(VqIndex index, std::span<const std::byte> payload, std::shared_ptr<const void> keeper, std::uint64_t resident);
 
-    BrickInfo info(BrickId id) const override { return index_.infos[place_of(id)]; }
+    BrickInfo info(BrickId id) const override { return index_.bricks.infos[number_of(desc(), id)]; }
     std::optional<BrickId> parent(BrickId) const override { return std::nullopt; }
     std::vector<DecodedBrick> refine(BrickId id, const BrickVoxels* parent, const std::stop_token& stop) const override;
     std::uint64_t family_bytes(BrickId id) const override { return desc().box_of(id).voxels() * desc().tree_voxel_bytes(); }
@@ -55,7 +48,6 @@ class VqBricks final : public Bricks {
     std::span<const std::byte> payload() const { return payload_; }
 
   private:
-    std::size_t place_of(BrickId id) const;
     VqIndex index_;
     std::span<const std::byte> payload_;
     std::shared_ptr<const void> keeper_;

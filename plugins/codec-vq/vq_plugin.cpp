@@ -64,7 +64,7 @@ void evaluate_encode(Evaluation& node) {
     node.measure("training distortion", report.distortion);
     node.measure("training time", report.training_seconds, "s");
     node.measure("codec time", report.codec_seconds, "s");
-    node.count("bricks", double(bricks->index().places.size()));
+    node.count("bricks", double(bricks->index().bricks.places.size()));
     node.count("codebooks", double(2 * bricks->index().books.size()));
     node.count("blocks sampled", double(report.sampled));
     node.count("sweeps", report.sweeps);
